@@ -9,6 +9,9 @@ from lgmd_gym.envs.dynamics.units import check_speed
 from lgmd_gym.errors import check_finite, check_within, shown
 from lgmd_gym.fields import Record, number, record, value
 
+MAX_CURVATURE = 2.0
+"""Largest curvature of a `Bend` [1/m]: a pedestrian turns at a corner with a radius of 0.5 m."""
+
 
 @dataclass(frozen=True, slots=True)
 class Bend:
@@ -16,7 +19,7 @@ class Bend:
 
     Attributes:
         length: Length along the path, > 0 [m].
-        curvature: Curvature at the start, + to the left, in [-1, 1] [1/m].
+        curvature: Curvature at the start, + to the left, in [-2, 2] [1/m].
         end_curvature: Curvature at the end [1/m]; None for constant curvature.
     """
 
@@ -28,8 +31,8 @@ class Bend:
         if check_finite("length", self.length) <= 0.0:
             raise ValueError(f"length of a Bend must be > 0 m, got {shown(self.length)}")
         check_within("length", self.length, 0.0, 1e6, "m")
-        check_within("curvature", self.curvature, -1.0, 1.0, "1/m")
-        check_within("end_curvature", self.last_curvature, -1.0, 1.0, "1/m")
+        check_within("curvature", self.curvature, -MAX_CURVATURE, MAX_CURVATURE, "1/m")
+        check_within("end_curvature", self.last_curvature, -MAX_CURVATURE, MAX_CURVATURE, "1/m")
 
     @property
     def last_curvature(self) -> float:

@@ -9,16 +9,19 @@ from lgmd_gym.openscenario.motion import MAX_ACCELERATION, Place, Timeline, sync
 from lgmd_gym.openscenario.nodes import Element
 from lgmd_gym.openscenario.routing import ON_PATH, acquire_position, assign_route, follow_trajectory
 from lgmd_gym.openscenario.weather import weather_of
-from lgmd_gym.openscenario.world import Mover, ScenarioMap, carry_over, read_controllers
+from lgmd_gym.openscenario.world import Mover, ScenarioMap, carry_over, read_controllers, signal_key
 
 _PIECES = 20  # of constant acceleration in a change of speed with a shape
+_LIMITS = ("maxAcceleration", "maxDeceleration", "maxAccelerationRate", "maxDecelerationRate", "maxSpeed")
 _JUMP = 0.5  # [m/s], change of the speed above which a jump gives a note
 
 
 def teleport(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
-    """Place an entity at the start."""
+    """Place an entity at the start; later only where it is, which has no effect."""
+    place = world.place(item.child("Position"), time)
+    if time > 0.0 and mover.track is not None and _is_at(mover.place(time), place):
+        return time
     only_at_start(item, time)
-    place = world.place(item.child("Position"))
     if mover.follows and mover.track is not None:
         distance = mover.track.nearest(place)
         if mover.track.at(distance).distance(place) <= ON_PATH:
@@ -28,6 +31,11 @@ def teleport(item: Element, mover: Mover, world: ScenarioMap, time: float) -> fl
     mover.start = place
     world.settle(mover)
     return time
+
+
+def _is_at(here: Place, there: Place) -> bool:
+    """Return whether two poses are the same, up to a distance and an angle that a path bridges."""
+    return here.distance(there) <= ON_PATH and cos(here.heading - there.heading) >= 0.999
 
 
 def assign_controller(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
@@ -62,13 +70,17 @@ def speed(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float
         if target.flag("continuous") and leader is not mover:
             return _keep_speed(item, mover, world, time, leader, relation, read_dynamics(dynamics))
         value = leader.timeline.at(time).speed * relation[0] + relation[1]
-    transition = read_dynamics(dynamics)
+    transition = read_dynamics(dynamics, zero_rate=True)
     if value < 0.0 and (time > 0.0 or not transition.is_step):
         raise target.error("driving backwards is supported from the start only; use a step in Init")
     if transition.is_step:
         return _step(item, mover, world, time, value)
-    if abs(value - now) < 1e-9:
-        return time
+    if abs(value - now) < 1e-9:  # ends a change that is under way
+        return _change(item, mover, world, time, 0.0, value)
+    if transition.dimension == "rate" and transition.value == 0.0:
+        world.note(item, f"{mover.name!r} keeps its speed: a rate of 0 never reaches {value:g} m/s")
+        _change(item, mover, world, time, 0.0, now)
+        return inf
     return _transition(item, mover, world, time, transition, value)
 
 
@@ -152,6 +164,8 @@ def _step(item: Element, mover: Mover, world: ScenarioMap, time: float, value: f
     change = value - mover.timeline.at(time).speed
     if abs(change) > 1e-6:
         _jump(item, mover, world, time, value)
+    else:
+        _change(item, mover, world, time, 0.0, mover.timeline.at(time).speed)
     return time
 
 
@@ -195,16 +209,29 @@ def _change(
 def speed_profile(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
     """Change an entity's speed in steps, within limits of acceleration and jerk.
 
-    The acceleration builds up with the given rate and ends at once.
+    The acceleration builds up with the given rate and ends at once. An entry with a time has a constant
+    acceleration; one with the time 0 is a step.
     """
-    item.choice("followingMode", ("follow", "position"))
+    exact = item.choice("followingMode", ("follow", "position")) == "position"
     limits = item.find("DynamicConstraints")
+    if limits is not None:
+        _check_limits(limits)
+    highest = inf if limits is None or not limits.has("maxSpeed") else limits.number("maxSpeed")
     for entry in item.all("SpeedProfileEntry"):
         final, now = entry.number("speed"), mover.timeline.at(time).speed
+        if final > highest:
+            raise entry.error(
+                f"SpeedProfileEntry speed={final:g} is above DynamicConstraints maxSpeed={highest:g}"
+            )
+        name = "maxAcceleration" if final > now else "maxDeceleration"
+        if entry.has("time") and entry.number("time") == 0.0 and final >= 0.0:
+            _step(item, mover, world, time, final)
+            continue
         if entry.has("time"):
             acceleration, build_up = (final - now) / max(entry.number("time"), 1e-9), 0.0
+            if not exact and limits is not None and limits.has(f"{name}Rate"):
+                world.note(entry, "the speed changes evenly in the time; the limit of the jerk has no effect")
         else:
-            name = "maxAcceleration" if final > now else "maxDeceleration"
             if limits is None or not limits.has(name):
                 raise entry.error(f"SpeedProfileEntry without time needs DynamicConstraints {name}")
             limit = limits.number(name)
@@ -212,6 +239,13 @@ def speed_profile(item: Element, mover: Mover, world: ScenarioMap, time: float) 
             acceleration = limit if final > now else -limit
         time = _change(item, mover, world, time, acceleration, final, build_up)
     return time
+
+
+def _check_limits(limits: Element) -> None:
+    """Raise ValueError for limits of `DynamicConstraints` that are not above 0."""
+    for name in _LIMITS:
+        if limits.has(name) and limits.number(name) <= 0.0:
+            raise limits.error(f"DynamicConstraints {name} must be > 0, got {limits.number(name):g}")
 
 
 def longitudinal_distance(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
@@ -324,8 +358,6 @@ _GROUPS = {
 """Elements that contain one action of some kinds."""
 NO_EFFECT = ("AppearanceAction", "ActivateControllerAction", "VariableAction")
 """Known actions that have no effect on the motion."""
-_GLOBAL_NO_EFFECT = ("InfrastructureAction",)
-"""Global actions that have no effect here, with a note."""
 
 
 def private_action(item: Element, mover: Mover, world: ScenarioMap) -> ActionRun | None:
@@ -347,11 +379,10 @@ def private_action(item: Element, mover: Mover, world: ScenarioMap) -> ActionRun
 
 def global_action(item: Element, world: ScenarioMap) -> ActionRun | None:
     """Return the function of a `GlobalAction`, or None for an action without effect."""
-    found = item.only("EntityAction", "ParameterAction", "EnvironmentAction", *_GLOBAL_NO_EFFECT, *NO_EFFECT)
-    if found.tag in _GLOBAL_NO_EFFECT:
-        found.skip()
-        world.note(found, f"{found.tag} has no effect")
-        return None
+    known = ("EntityAction", "ParameterAction", "EnvironmentAction", "InfrastructureAction")
+    found = item.only(*known, *NO_EFFECT)
+    if found.tag == "InfrastructureAction":
+        return _set_signal(found, world)
     if found.tag in ("ParameterAction", "VariableAction"):
         return _set_value(found, world)
     if found.tag in NO_EFFECT:
@@ -374,6 +405,25 @@ def global_action(item: Element, world: ScenarioMap) -> ActionRun | None:
             what = "DeleteEntityAction" if found.find("DeleteEntityAction") else "AddEntityAction"
             raise found.error(f"{what} at {time:.3g} s is supported in the first {AT_START:g} s only")
         mover.deleted = found.find("DeleteEntityAction") is not None
+        return time
+
+    return run
+
+
+def _set_signal(item: Element, world: ScenarioMap) -> ActionRun | None:
+    """Return the function of an `InfrastructureAction`; None if no condition refers to its signal."""
+    action = item.find("TrafficSignalAction")
+    found = None if action is None else action.find("TrafficSignalStateAction")
+    key = None if found is None else signal_key(found.text("name"))
+    if found is None or key not in world.watched:
+        item.skip()
+        world.note(item, f"{item.tag} has no effect")
+        return None
+    state = found.text("state")
+    world.note(item, "traffic signals are not drawn; their states have an effect on conditions only")
+
+    def run(time: float) -> float:
+        world.values.setdefault(key, [(-inf, "")]).append((time, state))
         return time
 
     return run

@@ -16,13 +16,23 @@ from math import ceil, cos, hypot, inf, pi, remainder, sin
 
 from lgmd_gym.envs.dynamics.script import Bend, Segment
 from lgmd_gym.envs.families.scenario import AFTERMATH, START_TTC, Actor, RoadPlan, Scenario
+from lgmd_gym.openscenario.conditions import SET_BY_ACTIONS
 from lgmd_gym.openscenario.motion import Place, Track, first_true
 from lgmd_gym.openscenario.nodes import Element, Node, check_used
 from lgmd_gym.openscenario.parameters import Catalogs
 from lgmd_gym.openscenario.roads import Road, RoadNetwork, read_roads
 from lgmd_gym.openscenario.storyboard import read_story, run_init
+from lgmd_gym.openscenario.trailers import pulled_by
 from lgmd_gym.openscenario.ways import follow
-from lgmd_gym.openscenario.world import Mover, ScenarioMap, lane_at, pose_of, read_entities, touching
+from lgmd_gym.openscenario.world import (
+    Mover,
+    ScenarioMap,
+    lane_at,
+    pose_of,
+    read_entities,
+    signal_key,
+    touching,
+)
 
 _WIDEST = 6.0  # [m], width of a lane; wider ones are open test areas
 _REACH = (-50.0, 500.0)  # [m] ahead of the ego within which a crossing road counts
@@ -108,7 +118,6 @@ def _straight(road: Road, direction: int, s: float, t: float) -> RoadPlan:
     return RoadPlan(lanes=len(own), ego_lane=index)
 
 
-EGOS = ("ego", "hero")  # names of the ego, in any case; without one, the first vehicle that moves
 _DRIVEN = ("car", "box", "motorcycle", "bicycle")  # kinds of bodies that may be the ego
 LEAD_IN = 1.0  # [s] at constant speeds before the first change of speed
 HORIZON = 120.0  # [s] within which a contact is searched for
@@ -147,7 +156,8 @@ class Compiled:
     world: ScenarioMap  # the world, for positions
     root: Element  # root element with the values of the parameters
     properties: dict[str, str]  # properties of the file
-    notes: tuple[str, ...]  # what has no effect although it is supported, with file and line
+    # what has no effect although it is supported, with file and line
+    notes: tuple[str, ...] = ()
 
 
 def compile_scenario(root: Element, family: str) -> Compiled:
@@ -159,24 +169,30 @@ def compile_scenario(root: Element, family: str) -> Compiled:
 def _compile_board(root: Element, family: str) -> Compiled:
     catalogs = Catalogs(root)
     movers = read_entities(root, catalogs)
-    world = ScenarioMap(_network(root), catalogs, movers)
+    network, note = _network(root)
+    world = ScenarioMap(network, catalogs, movers)
+    world.notes += [*catalogs.notes, *filter(None, [note])]
     board = root.child("Storyboard")
     world.watched = frozenset(_watched(board.node))
+    _check_signals(root.child("RoadNetwork").node, world.watched)
     run_init(board, world)
     notes = read_story(board, world).play(world)
     for node in (root.node, *catalogs.visited):
         check_used(node, IGNORED_TAGS, IGNORED_ATTRIBUTES)
     _note_routes(root, world)
     ego = _ego(root, world)
-    return _compile(root, world, ego, family, (*world.notes, *notes))
+    for trailer in ego.trailers[:1]:
+        world.note(trailer.item, f"the trailer of the ego {ego.name!r} is left out: it is behind the camera")
+    compiled = _compile(root, world, ego, family)
+    return replace(compiled, notes=(*world.notes, *notes))
 
 
-def _network(root: Element) -> RoadNetwork:
-    """Return the road network; without a `LogicFile`, one without roads."""
+def _network(root: Element) -> tuple[RoadNetwork, str]:
+    """Return the road network, without a `LogicFile` one without roads, and a note on its path or ""."""
     network = root.child("RoadNetwork").find("LogicFile")
     if network is None or not network.text("filepath"):
-        return RoadNetwork({})
-    path = network.path("filepath")
+        return RoadNetwork({}), ""
+    path, note = network.path_nearby("filepath")
     if not path.suffix and not path.exists():
         path = path.with_name(f"{path.name}.xodr")
         if not path.exists():
@@ -185,17 +201,30 @@ def _network(root: Element) -> RoadNetwork:
                 "the file"
             )
     with network.locate_errors():
-        return read_roads(path)
+        return read_roads(path), note
 
 
 def _watched(node: Node) -> Iterator[str]:
-    """Yield the names of the parameters and variables in the start conditions of a node."""
+    """Yield the names of the values that actions set in the start conditions of a node."""
     if node.tag == "StopTrigger":
         return
-    if node.tag in ("ParameterCondition", "VariableCondition"):
-        yield node.attributes.get("parameterRef", node.attributes.get("variableRef", "")).removeprefix("$")
+    if node.tag in SET_BY_ACTIONS:
+        name = node.attributes.get(SET_BY_ACTIONS[node.tag], "").removeprefix("$")
+        yield signal_key(name) if node.tag == "TrafficSignalCondition" else name
     for child in node.children:
         yield from _watched(child)
+
+
+def _check_signals(node: Node, watched: frozenset[str]) -> None:
+    """Raise ValueError if a condition refers to a signal that changes by the phases of a controller."""
+    name = node.attributes.get("trafficSignalId", "")
+    if signal_key(name) in watched:
+        raise node.error(
+            f"signal {name!r} of a TrafficSignalController in a TrafficSignalCondition is not supported; "
+            "use TrafficSignalStateAction"
+        )
+    for child in node.children:
+        _check_signals(child, watched)
 
 
 def _note_routes(root: Element, world: ScenarioMap) -> None:
@@ -215,26 +244,27 @@ def _note_routes(root: Element, world: ScenarioMap) -> None:
 
 
 def _ego(root: Element, world: ScenarioMap) -> Mover:
-    """Return the ego: named "ego" or "hero" in any case, else the first vehicle that moves."""
-    named = [mover for name, mover in world.movers.items() if name.lower() in EGOS]
+    """Return the ego: that of the map by its name, else the first vehicle that moves."""
     moving = [
         mover
         for mover in world.movers.values()
         if mover.body.kind in _DRIVEN and (mover.timeline.segments or mover.timeline.initial_speed > 0.0)
     ]
     entities = root.child("Entities")
-    if named:
-        if named[0] not in moving:
-            raise entities.error(f"the ego {named[0].name!r} never moves; give it a SpeedAction")
-        return named[0]
+    if world.ego is not None:
+        if world.ego not in moving:
+            raise entities.error(f"the ego {world.ego.name!r} never moves; give it a SpeedAction")
+        return world.ego
     if not moving:
         raise entities.error("the scenario needs a vehicle that moves, as the ego; name it Ego")
     world.note(entities, f"no entity has the name Ego; the ego is {moving[0].name!r}")
     return moving[0]
 
 
-def _compile(root: Element, world: ScenarioMap, ego: Mover, family: str, notes: tuple[str, ...]) -> Compiled:
+def _compile(root: Element, world: ScenarioMap, ego: Mover, family: str) -> Compiled:
     others = [item for item in world.movers.values() if item is not ego and not item.deleted and item.track]
+    trailers = [trailer for item in others for trailer in pulled_by(item)]
+    others += [trailer.mover for trailer in trailers]
     contact, target = _first_contact(ego, [item for item in others if item.body.kind != "road_marking"])
     header = root.find("FileHeader")
     properties = {} if header is None else header.properties()
@@ -246,6 +276,8 @@ def _compile(root: Element, world: ScenarioMap, ego: Mover, family: str, notes: 
         changes += [end for mover in (ego, *others) for _, end in mover.turns if end < inf]
         end = contact if contact < inf else max(changes, default=0.0) + START_TTC
         duration = end - start + AFTERMATH
+    for trailer in trailers:
+        trailer.check(start + duration, world)
     length = ego.body.length
     base, _, _ = pose_of(ego, start)
     scenario = Scenario(
@@ -260,7 +292,7 @@ def _compile(root: Element, world: ScenarioMap, ego: Mover, family: str, notes: 
         ego_width=ego.body.width,
         ego_reference=pose_of(ego, start)[1] if _bends(ego, start) else 0.0,
     )
-    return Compiled(scenario, world.weather, start, contact, ego, target, world, root, properties, notes)
+    return Compiled(scenario, world.weather, start, contact, ego, target, world, root, properties)
 
 
 def _start(contact: float, movers: list[Mover]) -> float:

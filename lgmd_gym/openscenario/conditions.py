@@ -7,11 +7,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import hypot, inf
 
+from lgmd_gym.openscenario.clearance import off_road, relative_clearance
 from lgmd_gym.openscenario.distances import Target, read_distance, relative_velocity
 from lgmd_gym.openscenario.motion import first_true
 from lgmd_gym.openscenario.nodes import Element
 from lgmd_gym.openscenario.parameters import RULES, compare
-from lgmd_gym.openscenario.world import Mover, ScenarioMap, touching
+from lgmd_gym.openscenario.world import Mover, ScenarioMap, signal_key, touching
 
 _CLOSE = 1e-9
 _NEVER = 1e9  # [s], for times that are undefined
@@ -174,6 +175,8 @@ _ENTITY: dict[str, Callable[[Element, Mover, ScenarioMap], Test]] = {
     "TimeHeadwayCondition": _time_headway,
     "CollisionCondition": _collision,
     "EndOfRoadCondition": _end_of_road,
+    "RelativeClearanceCondition": relative_clearance,
+    "OffroadCondition": off_road,
 }
 
 
@@ -196,6 +199,8 @@ class Condition:
     delay: float  # delay of the trigger [s]
     name: str = ""  # name in the file
     switch: bool = False  # whether it compares a parameter, so that it is constant on purpose
+    # times at which its value is set, in order; None for a condition that is no value set by actions [s]
+    changes: Callable[[], list[float]] | None = None
 
     def first(self, start: float) -> float:
         """Return the first time at or after a start at which the condition triggers [s]; inf for never."""
@@ -214,8 +219,9 @@ class Condition:
 
     def _jumps_at(self, start: float) -> bool:
         """Return whether the condition has its edge just at a time, by what happens at this time [s]."""
-        change = inf if self.jump is None else self.jump()
-        if not 0.0 < change < inf or abs(change - start) > _CLOSE:
+        found = [inf if self.jump is None else self.jump()] if self.changes is None else self.changes()
+        change = next((item for item in found if 0.0 < item < inf and abs(item - start) <= _CLOSE), None)
+        if change is None:
             return False
         before, after = self.holds(change - _JUST), self.holds(change + _JUST)
         return before != after and (self.edge == "risingOrFalling" or (self.edge == "rising") == after)
@@ -237,6 +243,9 @@ class Condition:
         """Return the first time at or after a start at which `holds` has a value [s]."""
         if start == inf:
             return inf
+        if self.changes is not None:
+            later = [start, *(change for change in self.changes() if change > start)]
+            return next((time for time in later if self.holds(time) == value), inf)
         if self.jump is not None:
             change = self.jump()
             after = self.holds(max(change, 0.0) + _JUST) if change < inf else self.holds(start)
@@ -316,42 +325,50 @@ def _condition(item: Element, world: ScenarioMap, states: States) -> Condition:
     if delay < 0.0:
         raise item.error(f"Condition delay must be >= 0 s, got {delay:g}")
     kind = item.only("ByValueCondition", "ByEntityCondition")
-    if kind.tag == "ByValueCondition":
-        holds, jump = _by_value(kind, world, states)
+    jump = changes = None
+    if kind.tag == "ByEntityCondition":
+        holds = entity_test(kind, world)
+    elif kind.find(*SET_BY_ACTIONS) is not None:
+        holds, changes = _of_value(kind, world)
     else:
-        holds, jump = entity_test(kind, world), None
+        holds, jump = _by_value(kind, states)
     switch = kind.find("ParameterCondition") is not None
-    return Condition(holds, jump, edge, delay, item.label() if item.has("name") else "", switch)
+    return Condition(holds, jump, edge, delay, item.label() if item.has("name") else "", switch, changes)
 
 
-_BY_VALUE = (
-    "SimulationTimeCondition",
-    "ParameterCondition",
-    "VariableCondition",
-    "StoryboardElementStateCondition",
-)
+SET_BY_ACTIONS = {
+    "ParameterCondition": "parameterRef",
+    "VariableCondition": "variableRef",
+    "TrafficSignalCondition": "name",
+}
+"""Conditions on values that actions set, and their attributes with the name of the value."""
+_BY_VALUE = ("SimulationTimeCondition", "StoryboardElementStateCondition", *SET_BY_ACTIONS)
 
 
-def _by_value(item: Element, world: ScenarioMap, states: States) -> tuple[Test, Callable[[], float] | None]:
+def _of_value(item: Element, world: ScenarioMap) -> tuple[Test, Callable[[], list[float]]]:
+    """Return the test of a value that actions set, and the times at which they set it."""
     found = item.only(*_BY_VALUE)
-    if found.tag == "SimulationTimeCondition":
-        limit, rule = found.number("value"), found.choice("rule", RULES[1:5])
-        return (lambda time: meets(time, rule, limit)), (lambda: limit)
-    if found.tag in ("ParameterCondition", "VariableCondition"):
-        name = found.name_of("parameterRef" if found.tag == "ParameterCondition" else "variableRef")
+    name = found.name_of(SET_BY_ACTIONS[found.tag])
+    if found.tag == "TrafficSignalCondition":
+        name, rule, bound = signal_key(found.text("name")), "equalTo", found.text("state")
+        world.values.setdefault(name, [(-inf, "")])
+    else:
         rule, bound = found.choice("rule", RULES), found.text("value")
         with found.locate_errors():
             compare(found.resolve(f"${name}"), rule, bound)
 
-        def met(time: float) -> bool:
-            with found.locate_errors():
-                return compare(world.value_of(found, name, time), rule, bound)
+    def met(time: float) -> bool:
+        with found.locate_errors():
+            return compare(world.value_of(found, name, time), rule, bound)
 
-        def change() -> float:
-            times = [time for time, _ in world.values.get(name, [])]
-            return next((time for time in times if met(time) != met(-1.0)), inf)
+    return met, lambda: [time for time, _ in world.values.get(name, []) if time > -inf]
 
-        return met, change
+
+def _by_value(item: Element, states: States) -> tuple[Test, Callable[[], float]]:
+    found = item.only(*_BY_VALUE)
+    if found.tag == "SimulationTimeCondition":
+        limit, rule = found.number("value"), found.choice("rule", RULES[1:5])
+        return (lambda time: meets(time, rule, limit)), (lambda: limit)
     key = found.text("storyboardElementType"), found.label("storyboardElementRef")
     known = ("completeState", "endTransition", "startTransition", "runningState")
     state = found.choice("state", known)

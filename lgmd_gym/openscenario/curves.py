@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lgmd_gym.envs.dynamics.script import Bend
+from lgmd_gym.envs.dynamics.script import MAX_CURVATURE, Bend
 from lgmd_gym.openscenario.motion import Place
 
 TOLERANCE = 2e-3
@@ -22,7 +22,7 @@ _ROUNDED = 4.0  # [m] within which a corner of a curve is rounded
 _LONGEST = 20.0  # [m], length of a piece that is tested at `_PROBES`
 _PROBES = (0.2, 0.4, 0.6, 0.8)
 _TURN = 0.8  # [rad], largest direction of an end of a piece relative to its chord
-_CURVATURE = 1.0  # [1/m], limit of a `Bend`
+_CURVATURE = 1.0  # [1/m], limit of a fitted clothoid
 _GAUSS = np.polynomial.legendre.leggauss(12)
 _NODES, _WEIGHTS = (_GAUSS[0] + 1.0) / 2.0, _GAUSS[1] / 2.0  # on [0, 1]
 
@@ -148,26 +148,29 @@ class Rounded(NamedTuple):
 def round_corners(points: Sequence[tuple[float, float]]) -> Rounded:
     """Return a polyline with arcs at its corners.
 
-    The radius of an arc is at least 1 m. It is larger where the segments have room, as long as the path
-    passes the vertex at 5 cm or less.
+    The radius of an arc is at least 1 m, or 0.5 m between short segments. It is larger where the segments
+    have room, as long as the path passes the vertex at 5 cm or less.
 
     Args:
         points: Vertices, each away from the previous one; at least 2 [m].
 
     Raises:
-        ValueError: If a corner has no room for an arc of 1 m.
+        ValueError: If a corner has no room for an arc of 0.5 m.
     """
     steps = [(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(points)]
     lengths = [hypot(*step) for step in steps]
     headings = [atan2(dy, dx) for dx, dy in steps]
     bends, stations, deviation = list[Bend](), [0.0], 0.0
+    halves = [0.0, *(remainder(b - a, tau) / 2 for a, b in pairwise(headings)), 0.0]
     used = distance = 0.0  # of the present segment, and of the path
     for number in range(1, len(steps)):
-        half = remainder(headings[number] - headings[number - 1], tau) / 2
-        room = min(lengths[number - 1], lengths[number]) / 2
+        half, before, after = halves[number], lengths[number - 1], lengths[number]
         tangent, radius = 0.0, 0.0
         if abs(half) > 1e-9:
-            radius = _radius(abs(half), room, points[number])
+            # A segment that is straight at its other end has room for an arc in its whole length.
+            whole = (abs(halves[number - 1]) <= 1e-9, abs(halves[number + 1]) <= 1e-9)
+            room = min(before * (1.0 if whole[0] else 0.5), after * (1.0 if whole[1] else 0.5))
+            radius = _radius(abs(half), min(before, after) / 2, room, points[number])
             tangent = radius * tan(abs(half))
             deviation = max(deviation, radius * (1.0 / cos(half) - 1.0))
         straight = lengths[number - 1] - used - tangent
@@ -186,13 +189,22 @@ def round_corners(points: Sequence[tuple[float, float]]) -> Rounded:
     return Rounded(Place(*points[0], headings[0]), tuple(bends), tuple(stations), deviation)
 
 
-def _radius(half: float, room: float, point: tuple[float, float]) -> float:
-    """Return the radius of the arc at a corner that turns by twice an angle [m]."""
+def _radius(half: float, room: float, whole: float, point: tuple[float, float]) -> float:
+    """Return the radius of the arc at a corner that turns by twice an angle [m].
+
+    Args:
+        half: Half of the angle, in [0, π / 2] [rad].
+        room: Length of both segments that the arc may use [m].
+        whole: Length that it may use if it needs more for a radius of 1 m [m].
+        point: The corner.
+    """
     largest = room / tan(half) if half < 1.55 else 0.0
-    if largest < 1.0:
+    if largest < 1.0 and half < 1.55:
+        largest = min(whole / tan(half), 1.0)
+    if largest < 1.0 / MAX_CURVATURE:
         raise ValueError(
             f"a corner of {2.0 * half:.3g} rad at x={point[0]:.4g}, y={point[1]:.4g} is too sharp for its "
-            "segments: a radius is at least 1 m; use a ClothoidSpline"
+            f"segments: a radius is at least {1.0 / MAX_CURVATURE:g} m; use a ClothoidSpline"
         )
     return min(largest, max(CORNER / (1.0 / cos(half) - 1.0), 1.0))
 

@@ -46,7 +46,7 @@ class Distance(NamedTuple):
         """Return the distance along or across the road of an entity, >= 0; nan beyond its end [m]."""
         here, there = one.place(time), other.place(time)
         spans = _spans(world, one, here)
-        (begin, own_left, line), (end, left, _) = _station(spans, here), _station(spans, there)
+        (begin, own_left, line), (end, left, _) = station(spans, here), station(spans, there)
         ahead = (end > begin) == (cos(here.heading - line.heading) > 0.0)
         apart = abs(end - begin) if self.kind == LONGITUDINAL else abs(left - own_left)
         if self.freespace and self.kind == LONGITUDINAL:
@@ -111,7 +111,7 @@ def _spans(world: ScenarioMap, mover: Mover, place: Place) -> tuple[Span, ...]:
     return (Span(road, 1, 0, 0.0, road.length, 0.0),)
 
 
-def _station(spans: tuple[Span, ...], place: Place) -> tuple[float, float, Place]:
+def station(spans: tuple[Span, ...], place: Place) -> tuple[float, float, Place]:
     """Return distance along and offset from the roads of a way, nan beyond its ends, and their pose [m]."""
     found: list[tuple[float, float, float, Place]] = []
     for road in dict.fromkeys(span.road for span in spans):

@@ -25,7 +25,7 @@ class Dynamics:
     @property
     def is_step(self) -> bool:
         """Whether the value changes at once."""
-        return self.shape == "step" or self.value == 0.0
+        return self.shape == "step" or (self.value == 0.0 and self.dimension != "rate")
 
     def share(self, part: float) -> float:
         """Return the part of the change at a part of the time or distance, both in [0, 1]."""
@@ -45,12 +45,19 @@ class Dynamics:
         return self.value
 
 
-def read_dynamics(item: Element) -> Dynamics:
-    """Return `TransitionDynamics`."""
+def read_dynamics(item: Element, zero_rate: bool = False) -> Dynamics:
+    """Return `TransitionDynamics`.
+
+    Args:
+        item: The element.
+        zero_rate: Whether a rate of 0 is allowed, with which the change never ends.
+    """
     shape = item.choice("dynamicsShape", SHAPES)
     dimension, value = item.choice("dynamicsDimension", DIMENSIONS), item.number("value")
     item.choice("followingMode", ("position",), "position")
     value = abs(value) if dimension == "rate" else value  # the sign follows from the values
+    if dimension == "rate" and value == 0.0 and shape != "step" and not zero_rate:
+        raise item.error(f"{item.tag} value must be > 0 for a rate, got 0; the change would never end")
     if value < 0.0:
         raise item.error(f"{item.tag} value must be >= 0, got {value:g}")
     return Dynamics(item, shape, dimension, value)

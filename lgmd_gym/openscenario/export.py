@@ -16,10 +16,10 @@ from lgmd_gym.envs.dynamics.script import Bend, Pose, Segment
 from lgmd_gym.envs.families.scenario import LANE_WIDTH, Actor, RoadPlan, Scenario
 from lgmd_gym.envs.motion import is_truck
 from lgmd_gym.errors import check_path, check_type
+from lgmd_gym.openscenario.bodies import SHADE
 from lgmd_gym.openscenario.compiler import DURATION
 from lgmd_gym.openscenario.motion import Place, Timeline
 from lgmd_gym.openscenario.reader import DRIVER, FAMILY, SUFFIX
-from lgmd_gym.openscenario.world import SHADE
 from lgmd_gym.processes.files import replace_file
 
 BEHIND, AHEAD, ARM = 300.0, 6000.0, 250.0  # [m], extent of straight roads, and of crossing roads

@@ -44,10 +44,7 @@ def lane_change(item: Element, mover: Mover, world: ScenarioMap, time: float) ->
     dynamics = read_dynamics(item.child("LaneChangeActionDynamics"))
     target = item.child("LaneChangeTarget").only("AbsoluteTargetLane", "RelativeTargetLane")
     now = on_road(item, mover, world, time)
-    value = target.number("value")
-    if not value.is_integer():
-        raise target.error(f"{target.tag} value must be the id of a lane, got {target.text('value')!r}")
-    lane = int(value)
+    lane = target.whole("value")
     if target.tag == "RelativeTargetLane":
         other = on_road(target, world.mover(target), world, time)
         lane = shifted(other.road, other.lane, lane * other.direction)

@@ -354,6 +354,24 @@ class Element:
         """Return an attribute with a path relative to the folder of the file; a backslash separates too."""
         return self.node.file.parent / self.text(name).replace("\\", "/")
 
+    def path_nearby(self, name: str) -> tuple[Path, str]:
+        """Return `path`, or the same path relative to the nearest folder above the file if only that exists.
+
+        Simulators have folders of their own from which they read paths, and the files of others rely on them.
+
+        Returns:
+            The path, and a note with file and line if it is relative to a folder above, else "".
+        """
+        path, text = self.path(name), self.text(name).replace("\\", "/")
+        if path.exists():
+            return path, ""
+        for folder in self.node.file.absolute().parents[1:]:
+            if (folder / text).exists():
+                return folder / text, str(
+                    self.error(f"{text!r} is relative to {str(folder)!r}, not to the folder of the file")
+                )
+        return path, ""
+
     def label(self, name: str = "name") -> str:
         """Return an attribute that is a name, as in the file if it is no expression with a value."""
         try:
@@ -393,6 +411,13 @@ class Element:
         if not math.isfinite(value):
             raise self.error(f"{self.tag} {name} must be finite, got {shown(text)}")
         return value
+
+    def whole(self, name: str, default: int | None = None) -> int:
+        """Return an attribute as a whole number."""
+        value = self.number(name, None if default is None else float(default))
+        if not value.is_integer():
+            raise self.error(f"{self.tag} {name} must be a whole number, got {shown(self.text(name))}")
+        return int(value)
 
     def flag(self, name: str, default: bool = False) -> bool:
         """Return an attribute as a bool."""

@@ -119,7 +119,8 @@ def _assigned(block: Element) -> dict[str, Assignment]:
 def variations(distribution: Element) -> list[dict[str, Assignment]]:
     """Return the assignments of every cell of a `ParameterValueDistribution`.
 
-    The cells are all combinations of the distributions; the first distribution varies slowest.
+    The cells are all combinations of the distributions; the first distribution varies slowest. A parameter
+    that one `ParameterValueSet` of several leaves out keeps its value of the scenario.
     """
     block = distribution.child("Deterministic")
     axes, size, names = list[list[dict[str, Assignment]]](), 1, set[str]()
@@ -129,10 +130,10 @@ def variations(distribution: Element) -> list[dict[str, Assignment]]:
         size *= len(axis)
         if size > MAX_CELLS:
             raise item.error(f"the file has more than {MAX_CELLS} cells; use fewer values")
-        for name in axis[0]:
-            if name in names:
-                raise item.error(f"parameter {name} is varied twice; remove one distribution")
-        names.update(axis[0])
+        own = {name for entry in axis for name in entry}
+        for name in sorted(own & names):
+            raise item.error(f"parameter {name} is varied twice; remove one distribution")
+        names |= own
         axes.append(axis)
     return [{name: item for part in parts for name, item in part.items()} for parts in product(*axes)]
 
@@ -140,8 +141,8 @@ def variations(distribution: Element) -> list[dict[str, Assignment]]:
 def _axis(item: Element) -> list[dict[str, Assignment]]:
     if item.tag == "DeterministicMultiParameterDistribution":
         axis = list(map(_assigned, item.only("ValueSetDistribution").all("ParameterValueSet")))
-        if not axis or any(entry.keys() != axis[0].keys() for entry in axis):
-            raise item.error("every ParameterValueSet of a distribution must assign the same parameters")
+        if not axis:
+            raise item.error("ValueSetDistribution must contain a ParameterValueSet")
         return axis
     if item.tag != "DeterministicSingleParameterDistribution":
         raise item.error(f"{item.tag} is not supported; use DeterministicSingleParameterDistribution")
@@ -174,10 +175,12 @@ class Catalogs:
 
     Attributes:
         visited: Nodes of the entries that were read.
+        notes: Folders that are relative to another one than that of the file.
     """
 
     def __init__(self, scenario: Element) -> None:
         self.visited: list[Node] = []
+        self.notes: list[str] = []
         locations = scenario.find("CatalogLocations")
         self._missing = list[ValueError]()  # errors of folders that do not exist
         self._folders = [] if locations is None else self._existing(locations)
@@ -212,13 +215,22 @@ class Catalogs:
         return Element(node, declare(Element(node, {}), assignments(reference)))
 
     def _existing(self, locations: Element) -> list[Path]:
-        """Return the folders of the catalogs; one that does not exist is an error once it is needed."""
+        """Return the folders of the catalogs, or a file for a folder that is one without its suffix.
+
+        One that does not exist is an error once it is needed.
+        """
         folders: list[Path] = []
         for node in locations.node.children:
             directory = Element(node, locations.scope).child("Directory")
-            folder = directory.path("path")
+            folder, note = directory.path_nearby("path")
             if folder.is_dir():
                 folders.append(folder)
+                self.notes += [note] if note else []
+            elif (file := folder.with_name(f"{folder.name}.xosc")).is_file():
+                folders.append(file)
+                self.notes.append(
+                    str(directory.error(f"the catalog is the file {file.name!r}, not a folder"))
+                )
             else:
                 text = f"the folder {directory.text('path')!r} does not exist; check CatalogLocations"
                 self._missing.append(directory.error(text))
@@ -226,7 +238,11 @@ class Catalogs:
 
     @cached_property
     def _entries(self) -> dict[tuple[str, str], Node]:
-        files = [path for folder in self._folders for path in sorted(folder.glob("*.xosc"))]
+        files = [
+            path
+            for folder in self._folders
+            for path in (sorted(folder.glob("*.xosc")) if folder.is_dir() else [folder])
+        ]
         return _entries_of(tuple(map(parse_file, files)))
 
 

@@ -3,7 +3,7 @@
 import re
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os.path import normpath
 from pathlib import Path
@@ -219,7 +219,7 @@ def _cells(
     path: Path,
     file: Path,
     root: Node,
-    given: Iterable[dict[str, Assignment]],
+    given: Sequence[dict[str, Assignment]],
     parameters: Mapping[str, str] | None,
     limit: int | None = None,
 ) -> list[Cell]:
@@ -227,6 +227,7 @@ def _cells(
     cells: list[Compiled] = []
     varied: list[dict[str, str]] = []
     violations: list[ConstraintError] = []
+    names = dict.fromkeys(name for assignments in given for name in assignments)
     for assignments in given:
         if len(cells) == limit:
             break
@@ -237,19 +238,20 @@ def _cells(
             continue
         family = file_name(scope.get(FAMILY, file.stem))
         cells.append(compile_scenario(Element(root, scope), family))
-        varied.append({name: item.value for name, item in assignments.items()})
+        given_here = {name: item.value for name, item in assignments.items()}
+        varied.append({name: given_here.get(name, scope[name]) for name in names})
     if violations:
         if not cells:
             raise violations[0]
         total = counted(len(cells) + len(violations), "cell")
         note = f"{violations[0]}; {len(violations)} of {total} left out for such a value"
         cells = [replace(cell, notes=(*cell.notes, note)) for cell in cells]
-    names = variants(varied, [cell.scenario.ego_speed for cell in cells])
+    variant_names = variants(varied, [cell.scenario.ego_speed for cell in cells])
     drivers = [
         FCW in path.stem or FCW in cell.scenario.family or cell.properties.get(DRIVER) == "true"
         for cell in cells
     ]
-    return list(map(Cell, names, cells, drivers))
+    return list(map(Cell, variant_names, cells, drivers))
 
 
 def _case(suite: str, cell: Cell, prefix: str = "") -> Case:

@@ -1,7 +1,7 @@
 """OpenDRIVE road networks: reference lines, lanes, the links between roads, and routes."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from heapq import heappop, heappush
 from itertools import pairwise
@@ -192,9 +192,10 @@ def _slope(coefficients: tuple[float, ...], x: float) -> float:
 
 @dataclass(frozen=True)
 class RoadNetwork:
-    """The roads of an OpenDRIVE file by id."""
+    """The roads of an OpenDRIVE file by id, and the road ends that direct junctions connect."""
 
     roads: dict[str, Road]
+    direct: dict[End, list[End]] = field(default_factory=dict[End, list[End]])
 
     def road(self, name: str) -> Road:
         """Return the road with an id."""
@@ -234,6 +235,7 @@ class RoadNetwork:
         link = self.roads[name].links.get(end)
         if link is not None and link[0] in self.roads:
             yield link
+        yield from self.direct.get((name, end), ())
         for other in self.roads.values():
             for side, target in other.links.items():
                 if target == (name, end):
@@ -258,7 +260,30 @@ def _network(node: Node) -> RoadNetwork:
         roads[road.name] = road
     if not roads:
         raise root.error("the file has no road")
-    return RoadNetwork(roads)
+    return RoadNetwork(roads, _direct_junctions(root, roads))
+
+
+def _direct_junctions(root: Element, roads: dict[str, Road]) -> dict[End, list[End]]:
+    """Return the road ends that direct junctions connect, without connecting roads, in both directions."""
+    ends: dict[tuple[str, str], str] = {}  # end of a road at a junction
+    for item in root.all("road"):
+        for end, other in _link_elements(item):
+            if other.text("elementType") == "junction":
+                ends[item.text("id"), other.text("elementId")] = end
+    found: dict[End, list[End]] = {}
+    for junction in root.all("junction"):
+        for connection in junction.all("connection") if junction.text("type", "default") == "direct" else ():
+            incoming, linked = connection.text("incomingRoad"), connection.text("linkedRoad")
+            contact, end = (
+                connection.choice("contactPoint", ("start", "end")),
+                (incoming, junction.text("id")),
+            )
+            if end not in ends or linked not in roads:
+                raise connection.error(f"road {incoming} or {linked} is not at junction {end[1]}")
+            one, other = (incoming, ends[end]), (linked, contact)
+            found.setdefault(one, []).append(other)
+            found.setdefault(other, []).append(one)
+    return found
 
 
 def _road(item: Element) -> Road:
@@ -280,11 +305,18 @@ def _road(item: Element) -> Road:
 
 def _links(item: Element) -> Iterator[tuple[str, End]]:
     """Yield the connections to roads; those to junctions follow from the connecting roads."""
+    for own, other in _link_elements(item):
+        if other.text("elementType") == "road":
+            yield own, (other.text("elementId"), other.choice("contactPoint", ("start", "end")))
+
+
+def _link_elements(item: Element) -> Iterator[tuple[str, Element]]:
+    """Yield the ends of a road with the elements of what follows them."""
     link = item.find("link")
     for tag, own in (("predecessor", "start"), ("successor", "end")):
         other = None if link is None else link.find(tag)
-        if other is not None and other.text("elementType") == "road":
-            yield own, (other.text("elementId"), other.choice("contactPoint", ("start", "end")))
+        if other is not None:
+            yield own, other
 
 
 def _lanes(section: Element) -> dict[int, Lane]:
@@ -292,10 +324,7 @@ def _lanes(section: Element) -> dict[int, Lane]:
     for side in section.all("left", "right"):
         for lane in side.all("lane"):
             widths = tuple(_width(width, "sOffset") for width in lane.all("width"))
-            number = lane.number("id")
-            if not number.is_integer():
-                raise lane.error(f"lane id must be a whole number, got {number:g}")
-            lanes[int(number)] = Lane(lane.text("type"), widths)
+            lanes[lane.whole("id")] = Lane(lane.text("type"), widths)
     return lanes
 
 

@@ -1,9 +1,12 @@
 """Routing actions: trajectories, with and without times, routes and positions to reach."""
 
-from math import cos
+from itertools import accumulate
+from math import cos, remainder, tau
 
 from lgmd_gym.envs.dynamics.path import rear_axle_path
-from lgmd_gym.openscenario.motion import Track
+from lgmd_gym.envs.dynamics.script import Bend
+from lgmd_gym.openscenario.curves import fit
+from lgmd_gym.openscenario.motion import Place, Track
 from lgmd_gym.openscenario.nodes import Element
 from lgmd_gym.openscenario.roads import Road
 from lgmd_gym.openscenario.trajectories import action_times
@@ -11,6 +14,9 @@ from lgmd_gym.openscenario.ways import follow
 from lgmd_gym.openscenario.world import Mover, ScenarioMap, carry_over, lane_at
 
 ON_PATH = 0.1  # [m] from a path within which an entity can begin to follow it
+CORNER = 0.5  # [rad] beside the heading of a path up to which an entity can begin to follow it
+_SMOOTH = 0.045  # [rad], corner above which the path is rounded
+_ROOM = 5.0  # [m] of a path for the rounding of a corner at its start
 
 
 def follow_trajectory(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:
@@ -39,7 +45,7 @@ def follow_trajectory(item: Element, mover: Mover, world: ScenarioMap, time: flo
         _continue_lane(mover, world, track.length - offset)
         return mover.timeline.time_of(track.length - offset) if track.bends else time
     begin = track.nearest(mover.place(time)) if offset == 0.0 else offset
-    _continue(item, mover, time, track.part(begin))
+    _continue(item, mover, world, time, track.part(begin))
     end = mover.timeline.at(time).distance + track.length - begin
     _continue_lane(mover, world, end)
     return mover.timeline.time_of(end)
@@ -71,7 +77,7 @@ def _follow_times(
         mover.track, mover.start, mover.follows = track.part(begin), track.at(begin), True
         mover.way = None
     else:
-        _continue(item, mover, time, track.part(begin))
+        _continue(item, mover, world, time, track.part(begin))
     _continue_lane(mover, world, driven + track.length - begin)
     with item.locate_errors(f"{item.tag} of {mover.name!r}: "):
         planned = [(time, driven), *((when, driven + where - begin) for when, where in rest)]
@@ -101,14 +107,28 @@ def _continue_lane(mover: Mover, world: ScenarioMap, distance: float) -> None:
         mover.track = mover.path.then(distance, rest)
 
 
-def _continue(item: Element, mover: Mover, time: float, rest: Track) -> None:
+def _continue(item: Element, mover: Mover, world: ScenarioMap, time: float, rest: Track) -> None:
     """Continue the path of an entity with another from where it is."""
     distance = mover.timeline.at(time).distance
     here = mover.path.at(distance)
-    if here.distance(rest.start) > ON_PATH or cos(here.heading - rest.start.heading) < 0.999:
+    turn = abs(remainder(here.heading - rest.start.heading, tau))
+    if here.distance(rest.start) > ON_PATH or turn > CORNER:
         raise item.error(f"{mover.name!r} is not on its path at {time:.3g} s; begin the path where it is")
-    mover.track, mover.follows = mover.path.then(distance, rest.bends), True
+    bends = rest.bends
+    if turn > _SMOOTH:
+        world.note(item, f"the path of {mover.name!r} has a corner of {turn:.2g} rad, which is rounded")
+        with item.locate_errors():
+            bends = _rounded(here, rest)
+    mover.track, mover.follows = mover.path.then(distance, bends), True
     mover.replan = mover.way = None
+
+
+def _rounded(here: Place, rest: Track) -> tuple[Bend, ...]:
+    """Return the bends of a path from a pose beside its heading on, which meets it within a few metres."""
+    joints = [*accumulate(bend.length for bend in rest.bends)]
+    end = next((joint for joint in joints if joint >= _ROOM), max(rest.length, _ROOM))
+    stops = [0.0, *(joint for joint in joints if joint < end), end]
+    return (*fit(rest.at, stops, here), *rest.part(end).bends)
 
 
 def assign_route(item: Element, mover: Mover, world: ScenarioMap, time: float) -> float:

@@ -24,7 +24,9 @@ class Event:
     runs: list[tuple[str, ActionRun]]  # its actions; empty if none has an effect
     maneuver: Node  # the maneuver that contains it
     skips: bool  # whether it does not start while another event of its maneuver runs (priority "skip")
-    count: int = 1  # how often it may start
+    count: int = 1  # how often it may start, in the present execution of its group
+    group: "Group | None" = None  # its maneuver group, if that is carried out several times
+    begin: float = 0.0  # start of the present execution of its group [s]
     act_start: float = inf  # start of its act [s]
     started: float = inf  # start [s]; inf before
     ended: float = inf  # end [s]; inf before the start
@@ -32,7 +34,21 @@ class Event:
     @property
     def free_from(self) -> float:
         """Time from which it may start, after its present execution [s]."""
-        return self.ended if self.ended < inf else 0.0
+        return self.ended if self.ended < inf else self.begin
+
+
+@dataclass(eq=False)
+class Group:
+    """A maneuver group with several events that is carried out more than once."""
+
+    repeats: int  # how often it is still carried out after the present execution
+    counts: list[tuple[Event, int]]  # its events, and how often each may start in an execution
+
+    @property
+    def complete(self) -> float:
+        """End of the present execution [s]; inf before all its events are complete."""
+        left = any(event.count for event, _ in self.counts)
+        return inf if left else max(event.ended for event, _ in self.counts)
 
 
 @dataclass
@@ -77,8 +93,7 @@ class Storyboard:
                 break
             self._carry_out(event, now)
             event.count -= 1
-            if event.count == 0 or event.ended == inf:
-                waiting.remove(event)
+            waiting = self._still_waiting(event, waiting)
         else:
             raise waiting[0].item.error(
                 f"events start more than {MAX_STARTS} times; lower maximumExecutionCount"
@@ -87,9 +102,17 @@ class Storyboard:
         for event in waiting:
             event.item.skip()
             reason = _reason(*triggers[event], last)
-            if event.runs and reason and event.started == inf:
+            if event.runs and reason and event.started == inf and event.begin == 0.0:
                 notes.append(str(event.item.error(f"event {event.item.label()!r} never starts: {reason}")))
         return notes
+
+    def _still_waiting(self, event: Event, waiting: list[Event]) -> list[Event]:
+        """Return the events that wait after one has been carried out, in the order of the file."""
+        if event.count == 0 or event.ended == inf:
+            waiting = [item for item in waiting if item is not event]
+        if event.group is not None and self._repeat(event.group):
+            waiting = [item for item in self.events if item in waiting or item.group is event.group]
+        return waiting
 
     def _start(self, event: Event, act: Trigger, own: Trigger, now: float) -> float:
         """Return the time at which an event starts, and note the start of its act [s].
@@ -107,9 +130,22 @@ class Storyboard:
             self.states[key] = min(begun, start), end
         return own.first(max(begun, now, event.free_from)) if begun < inf else inf
 
+    def _repeat(self, group: Group) -> bool:
+        """Begin the next execution of a group if the present one is complete; return whether it began."""
+        end = group.complete
+        if end == inf or group.repeats == 0:
+            return False
+        group.repeats -= 1
+        for event, count in group.counts:
+            event.count, event.begin, event.started, event.ended = count, end, inf, inf
+            for key in event.groups[3:]:  # its maneuver and itself
+                self.states[key] = inf, inf
+        return True
+
     def _matters(self, event: Event) -> bool:
-        """Return whether an event changes the motion, or another event that does refers to it."""
-        if event.runs:
+        """Return whether an event changes the motion, or another event that does waits for it."""
+        group = [] if event.group is None else [other for other, _ in event.group.counts]
+        if event.runs or any(other.runs for other in group):
             return True
         names = {name for _, name in event.groups}
         return any(
@@ -255,39 +291,75 @@ def _group_events(
 ) -> list[Event]:
     repeats = _execution_count(group)
     actors = group.child("Actors")
-    if actors.flag("selectTriggeringEntities"):
-        raise actors.error("selectTriggeringEntities=true is not supported; list the entities")
+    selects = actors.flag("selectTriggeringEntities")
     movers = [world.mover(item) for item in actors.all("EntityRef")]
-    maneuvers = [*group.all("Maneuver")]
+    maneuvers = [Element(item.node, declare(item, {})) for item in group.all("Maneuver")]
     maneuvers += [world.catalogs.entry(item, "Maneuver") for item in group.all("CatalogReference")]
     outer = [("story", story.label()), ("act", act.label()), ("maneuverGroup", group.label())]
     events: list[Event] = []
     for maneuver in maneuvers:
         for event in maneuver.all("Event"):
-            count = repeats * _execution_count(event)
-            if count == 0:
+            count = _execution_count(event)
+            if repeats * count == 0:
                 event.skip()
                 continue
             priority = event.choice("priority", ("override", "overwrite", "parallel", "skip"))
             names = [*outer, ("maneuver", maneuver.label()), ("event", event.label())]
             runs = [run for action in event.all("Action") for run in _runs(action, movers, world)]
+            if selects and any(action.find("PrivateAction") for action in event.all("Action")):
+                raise actors.error("selectTriggeringEntities=true is not supported; list the entities")
             triggers = trigger, event.find("StartTrigger")
+            if world.ego is not None and any(_needs_contact(item, world.ego.name) for item in triggers):
+                event.skip()
+                world.note(
+                    event,
+                    f"event {event.label()!r} waits for a contact of the ego, which ends the episode; it is "
+                    "left out",
+                )
+                continue
             found = Event(event, triggers, names, runs, maneuver.node, priority == "skip", count)
             events.append(found)
-    if repeats > 1 and len(events) > 1:
-        raise group.error(f"ManeuverGroup maximumExecutionCount must be 1 for several events, got {repeats}")
+    if len(events) == 1:
+        events[0].count *= repeats
+    elif repeats > 1:
+        repeated = Group(repeats - 1, [(event, event.count) for event in events])
+        for event in events:
+            event.group = repeated
     return events
+
+
+def _needs_contact(trigger: Element | None, ego: str) -> bool:
+    """Return whether a trigger waits for a contact of the ego in each group of its conditions."""
+    groups = [] if trigger is None else list(trigger.all("ConditionGroup"))
+    return bool(groups) and all(
+        any(_is_contact(condition, ego) for condition in group.all("Condition")) for group in groups
+    )
+
+
+def _is_contact(condition: Element, ego: str) -> bool:
+    """Return whether a condition is a contact of the ego."""
+    kind = condition.find("ByEntityCondition")
+    if kind is None:
+        return False
+    found = kind.child("EntityCondition").find("CollisionCondition")
+    if found is None:
+        return False
+    triggering = [item.text("entityRef") for item in kind.child("TriggeringEntities").all("EntityRef")]
+    return triggering == [ego] or any(item.text("entityRef") == ego for item in found.all("EntityRef"))
 
 
 def _execution_count(item: Element) -> int:
     """Return how often a maneuver group or an event is carried out."""
-    count = item.number("maximumExecutionCount", 1.0)
-    if not count.is_integer() or count < 0.0:
-        raise item.error(f"{item.tag} maximumExecutionCount must be a whole number >= 0, got {count:g}")
-    return int(count)
+    count = item.whole("maximumExecutionCount", 1)
+    if count < 0:
+        raise item.error(f"{item.tag} maximumExecutionCount must be >= 0, got {count}")
+    return count
 
 
 def _runs(action: Element, movers: list[Mover], world: ScenarioMap) -> list[tuple[str, ActionRun]]:
+    if not action.node.children:
+        world.note(action, f"Action {action.label()!r} is empty and has no effect")
+        return []
     found = action.only("PrivateAction", "GlobalAction", "UserDefinedAction")
     if found.tag == "UserDefinedAction":
         found.skip()

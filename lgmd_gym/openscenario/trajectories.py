@@ -106,7 +106,7 @@ _HEADED = ("WorldPosition", "LanePosition", "RoadPosition", "RelativeLanePositio
 
 def _nurbs(shape: Element, locate: Locate) -> Trajectory:
     """Return a NURBS curve."""
-    controls, order = list(shape.all("ControlPoint")), int(shape.number("order"))
+    controls, order = list(shape.all("ControlPoint")), shape.whole("order")
     knots = [knot.number("value") for knot in shape.all("Knot")]
     if order < 2 or len(controls) < order or len(knots) != len(controls) + order:
         raise shape.error(

@@ -6,7 +6,8 @@ from math import cos, hypot, pi, remainder
 
 from lgmd_gym.camera import CLEAR
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
-from lgmd_gym.errors import check_known, check_whole, unknown_name
+from lgmd_gym.errors import unknown_name
+from lgmd_gym.openscenario.bodies import EntityBody, Trailer, read_body, read_trailers
 from lgmd_gym.openscenario.motion import Place, Timeline, Track
 from lgmd_gym.openscenario.nodes import Element
 from lgmd_gym.openscenario.parameters import Catalogs
@@ -15,38 +16,7 @@ from lgmd_gym.openscenario.trajectories import Trajectory, read_trajectory
 from lgmd_gym.openscenario.ways import Way, follow
 
 CONTROL_POINT = "Driver.ControlPoint.Mode"  # property of a controller, Vector DYNA4
-SHADE = "lgmd_gym.shade"
-"""Property of an entity: the grey level of the actor."""
-KIND = "lgmd_gym.kind"
-"""Property of an entity: the kind of the actor, where the category does not define it."""
-_VEHICLES = {
-    "car": "car",
-    "van": "car",
-    "truck": "car",
-    "bus": "car",
-    "bicycle": "bicycle",
-    "motorbike": "motorcycle",
-    "tram": "box",
-    "train": "box",
-    "trailer": "box",
-    "semitrailer": "box",
-}
-_PEDESTRIANS = {"pedestrian": "pedestrian", "wheelchair": "pedestrian", "animal": "box"}
-_FLAT = ("crosswalk", "patch", "roadMark", "parkingSpace")
-_OWN = ("ego", "car", "box", "road_marking", "pedestrian", "bicycle", "motorcycle")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EntityBody:
-    """Size and kind of an entity."""
-
-    kind: str  # kind of actor, see `Actor`
-    length: float  # length [m]
-    width: float  # width [m]
-    height: float  # height [m]
-    reference: float  # distance of the centre ahead of the reference point, the rear axle of a vehicle [m]
-    wheelbase: float = 0.0  # distance between the axles [m]; 0 without axles
-    shade: int | None = None  # grey level; None for a random one
+EGOS = ("ego", "hero")  # names of the ego, in any case; without one, the first vehicle that moves
 
 
 @dataclass(slots=True)
@@ -65,6 +35,7 @@ class Mover:
     controllers: list[Element] = field(default_factory=list[Element])  # controllers without effect
     leader: "Mover | None" = None  # entity whose speed it copies
     relation: tuple[float, float] = (1.0, 0.0)  # factor of that speed, and addition to it [m/s]
+    trailers: tuple[Trailer, ...] = ()  # its trailers, in their order
     deleted: bool = False  # whether it has been deleted at the start
     way: Way | None = None  # the lanes along which its path leads; None without any
     chosen: bool = False  # whether its way is one of several
@@ -111,8 +82,9 @@ def read_entities(scenario: Element, catalogs: Catalogs) -> dict[str, Mover]:
         if name in movers:
             raise item.error(f"ScenarioObject name {name!r} is used twice; choose another")
         found = catalogs.resolve(item, "Vehicle", "Pedestrian", "MiscObject")
-        mover = Mover(name, _body(found), found.tag)
-        read_controllers(item, mover, catalogs)
+        mover = Mover(name, read_body(found), found.tag, trailers=read_trailers(found, catalogs))
+        for controllers in item.all("ObjectController"):
+            read_controllers(controllers, mover, catalogs)
         movers[name] = mover
     return movers
 
@@ -144,42 +116,6 @@ def read_controllers(item: Element, mover: Mover, catalogs: Catalogs) -> None:
         mover.front_axle = mode == "FrontAxle"
         if values or mode is None:
             mover.controllers.append(child)
-
-
-def _body(item: Element) -> EntityBody:
-    box = item.child("BoundingBox")
-    centre, size = box.child("Center"), box.child("Dimensions")
-    if centre.number("y", 0.0) != 0.0:
-        raise centre.error("a bounding box beside the centreline is not supported; use y=0")
-    properties = item.properties()
-    with item.locate_errors():
-        kind = check_known(KIND, properties.get(KIND, _kind(item)), _OWN)
-        shade = None if SHADE not in properties else check_whole(SHADE, float(properties[SHADE]), 0, 255)
-    return EntityBody(
-        kind=kind,
-        length=size.number("length"),
-        width=size.number("width"),
-        height=size.number("height"),
-        reference=centre.number("x"),
-        wheelbase=_wheelbase(item),
-        shade=shade,
-    )
-
-
-def _kind(item: Element) -> str:
-    if item.tag == "Vehicle":
-        return _VEHICLES[item.choice("vehicleCategory", tuple(_VEHICLES))]
-    if item.tag == "Pedestrian":
-        return _PEDESTRIANS[item.choice("pedestrianCategory", tuple(_PEDESTRIANS))]
-    return "road_marking" if item.text("miscObjectCategory") in _FLAT else "box"
-
-
-def _wheelbase(item: Element) -> float:
-    axles = item.find("Axles")
-    if axles is None:
-        return 0.0
-    positions = [axle.number("positionX") for axle in axles.all("FrontAxle", "RearAxle")]
-    return max(positions) - min(positions) if len(positions) > 1 else 0.0
 
 
 def carry_over(world: "ScenarioMap", mover: Mover, time: float) -> None:
@@ -225,14 +161,20 @@ POSITIONS = (
 )
 
 
+def signal_key(name: str) -> str:
+    """Return the name of the state of a traffic signal among the values of a scenario."""
+    return f"signal {name}"  # a parameter has no space in its name
+
+
 class ScenarioMap:
     """Roads, catalogs and entities.
 
     Attributes:
         notes: What has no effect or deviates from the file, with file and line.
         weather: Name of the weather at the start.
-        watched: Names of the parameters and variables in conditions.
-        values: Values given to parameters and variables by actions, with their times [s].
+        watched: Names of the parameters, variables and states of signals in conditions.
+        values: Values given to them by actions, with their times [s].
+        ego: The entity with the name "ego" or "hero", in any case; None without one.
     """
 
     def __init__(self, network: RoadNetwork, catalogs: Catalogs, movers: dict[str, Mover]) -> None:
@@ -241,6 +183,7 @@ class ScenarioMap:
         self.weather = CLEAR
         self.watched = frozenset[str]()
         self.values: dict[str, list[tuple[float, str]]] = {}
+        self.ego = next((mover for name, mover in movers.items() if name.lower() in EGOS), None)
 
     def mover(self, item: Element, attribute: str = "entityRef") -> Mover:
         """Return the entity that an attribute names."""
@@ -285,7 +228,7 @@ class ScenarioMap:
         return Place(item.number("x"), item.number("y"), item.number("h", 0.0))
 
     def _LanePosition(self, item: Element, time: float) -> Place:
-        road, lane = self.road(item), int(item.number("laneId"))
+        road, lane = self.road(item), item.whole("laneId")
         return _in_lane(road, lane, self._along(item, road), item.number("offset", 0.0))
 
     def _RoadPosition(self, item: Element, time: float) -> Place:
@@ -304,7 +247,7 @@ class ScenarioMap:
     def _RelativeLanePosition(self, item: Element, time: float) -> Place:
         mover = self.mover(item)
         road, s, t = self.road_of(mover, mover.place(time))
-        lane = shifted(road, lane_at(road, s, t), int(item.number("dLane")))
+        lane = shifted(road, lane_at(road, s, t), item.whole("dLane"))
         if item.has("dsLane"):
             return self._along_lane(road, lane, s, item.number("dsLane"), item.number("offset", 0.0))
         return _in_lane(road, lane, s + item.number("ds"), item.number("offset", 0.0))
@@ -345,7 +288,7 @@ class ScenarioMap:
         s = where.number("pathS")
         if where.tag == "FromRoadCoordinates":
             return route.at(s, where.number("t"))
-        offset = route.lane_centre(int(where.number("laneId")), s)
+        offset = route.lane_centre(where.whole("laneId"), s)
         return route.at(s, offset + where.number("laneOffset", 0.0))
 
     def route(self, parent: Element) -> Route:
@@ -357,9 +300,15 @@ class ScenarioMap:
         for waypoint in item.all("Waypoint"):
             waypoint.choice("routeStrategy", ("shortest", "fastest", "leastIntersections", "random"))
             position = waypoint.child("Position").only("LanePosition", "RoadPosition")
-            lane = int(position.number("laneId")) if position.tag == "LanePosition" else None
+            lane = position.whole("laneId") if position.tag == "LanePosition" else None
             position.number("offset", 0.0)
             position.number("t", 0.0)
+            turned = position.find("Orientation")
+            if turned is not None and (
+                turned.choice("type", ("absolute", "relative"), "absolute") == "absolute"
+                or turned.number("h", 0.0) != 0.0
+            ):
+                raise turned.error("the Orientation of a Waypoint is not supported; remove it")
             stops.append((self.road(position), lane, position.number("s")))
         return self.route_through(item, stops)
 

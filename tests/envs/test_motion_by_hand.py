@@ -152,7 +152,7 @@ def test_bends():
     assert turn(0.25, 10.0, 4.0) == (Bend(2.5, 0.0, 0.1), Bend(2.5, 0.1, 0.0))
     assert Bend(4.0, 0.0, 0.1).turn == pytest.approx(0.2)
     assert Bend(4.0, 0.1).turn == pytest.approx(0.4)
-    for curvature in (-1.0, 1.0):
+    for curvature in (-2.0, 2.0):
         assert Bend(1.0, curvature, curvature).last_curvature == curvature
 
 

@@ -70,5 +70,5 @@ def test_path_is_continuous_across_cells():
 def test_invalid_bends_raise():
     with pytest.raises(ValueError, match="length of a Bend must be > 0 m, got 0"):
         Bend(0)
-    with pytest.raises(ValueError, match=r"curvature must be in \[-1, 1\] 1/m, got 3"):
+    with pytest.raises(ValueError, match=r"curvature must be in \[-2, 2\] 1/m, got 3"):
         Bend(1.0, 3)

@@ -55,6 +55,45 @@ def test_speed_profiles_have_a_limit_of_jerk(tmp_path):
     assert third == Segment(start=5.25, acceleration=1.0, final_speed=5.0)
 
 
+def test_speed_profiles_with_times(tmp_path):
+    """An entry at the time 0 is a step, also in Init; the others have constant accelerations."""
+    entries = '<SpeedProfileEntry speed="5" time="0"/><SpeedProfileEntry speed="8" time="2"/>'
+    text = (
+        '<LongitudinalAction><SpeedProfileAction followingMode="position"><DynamicConstraints maxSpeed="8"/>'
+        f"{entries}</SpeedProfileAction></LongitudinalAction>"
+    )
+    init = START + private("Target", text)
+    found = compiled(tmp_path, scenario(init)).world.movers["Target"].timeline
+    assert found.at(0.0).speed == 5.0
+    assert found.segments == [Segment(start=0.0, acceleration=1.5, final_speed=8.0)]
+    notes = compiled(tmp_path, scenario(START, story("Target", event("E", PROFILE, at(1))))).notes
+    assert [note.split(": ", 1)[1] for note in notes] == [
+        "the speed changes evenly in the time; the limit of the jerk has no effect"
+    ] * ("maxDecelerationRate" in PROFILE or "maxAccelerationRate" in PROFILE)
+
+
+@pytest.mark.parametrize("shape", ["linear", "step"])
+def test_a_change_to_the_present_speed_ends_a_change(tmp_path, shape):
+    """The target has 4 m/s after 2 of 5 s; the second action keeps it."""
+    events = event("E", speed(10, "rate", "linear", 2), at(1)), event("F", speed(4, "rate", shape, 2), at(3))
+    found = compiled(tmp_path, scenario(START, story("Target", *events))).world.movers["Target"].timeline
+    assert found.at(2.0).speed == pytest.approx(2.0)
+    assert found.at(10.0).speed == pytest.approx(4.0)
+    assert found.at(10.0).distance == pytest.approx(4.0 + 7.0 * 4.0)
+
+
+def test_a_teleport_to_the_same_place(tmp_path):
+    """It has no effect after the start, but for one to another place or heading."""
+    same = '<RelativeObjectPosition entityRef="Target" dx="0" dy="0"/>'
+    teleports = f"<TeleportAction><Position>{same}</Position></TeleportAction>"
+    events = event("E", AWAY, at(1)), event("F", teleports, at(2))
+    found = compiled(tmp_path, scenario(START, story("Target", *events)))
+    assert found.scenario == compiled(tmp_path, scenario(START, story("Target", events[0]))).scenario
+    turned = same.replace("/>", '><Orientation type="relative" h="0.1"/></RelativeObjectPosition>')
+    with pytest.raises(ValueError, match="TeleportAction is supported at the start only, got 2 s"):
+        compiled(tmp_path, scenario(START, story("Target", events[0], events[1].replace(same, turned))))
+
+
 SYNC = f"""<SynchronizeAction masterEntityRef="Ego"><TargetPositionMaster>{lane_position(160)}
 </TargetPositionMaster><TargetPosition>{lane_position(172)}</TargetPosition><FinalSpeed>
 <AbsoluteSpeed value="4"><TargetDistanceSteadyState distance="8"/></AbsoluteSpeed></FinalSpeed>
@@ -263,9 +302,11 @@ def test_driving_backwards_is_turned_around(tmp_path):
         (speed(6, "time", "linear", -2), "SpeedActionDynamics value must be >= 0, got -2"),
         (speed(6, "distance", "cubic", 20), "a cubic or sinusoidal change of speed over a distance is not"),
         (speed(60, "rate", "linear", 2), "SpeedAction of 'Target': final_speed: 60 m/s"),
+        (PROFILE.replace("/><", ' maxSpeed="5"/><', 1), "speed=6 is above DynamicConstraints maxSpeed=5"),
+        (PROFILE.replace('"4"', '"0"'), "DynamicConstraints maxAccelerationRate must be > 0, got 0"),
         (speed(-1, "rate", "linear", 2), "driving backwards is supported from the start only"),
         (
-            "<TeleportAction><Position/></TeleportAction>",
+            f"<TeleportAction><Position>{lane_position(160.2)}</Position></TeleportAction>",
             "TeleportAction is supported at the start only, got 1 s",
         ),
         (
@@ -288,3 +329,15 @@ def test_driving_backwards_is_turned_around(tmp_path):
 def test_unsupported_actions(tmp_path, action, message):
     with pytest.raises(ValueError, match=rf"case\.xosc:\d+: .*{message}"):
         compiled(tmp_path, scenario(START, story("Target", event("E", action, at(1)))))
+
+
+def test_a_rate_of_zero(tmp_path):
+    """The speed stays that of the start of the action, which never ends."""
+    events = (
+        event("E", speed(10, "rate", "linear", 2), at(1)),
+        event("F", speed(6, "rate", "linear", 0), at(3)),
+    )
+    found = compiled(tmp_path, scenario(START, story("Target", *events)))
+    assert found.world.movers["Target"].timeline.at(20.0).speed == pytest.approx(4.0)
+    assert any("'Target' keeps its speed: a rate of 0 never reaches 6 m/s" in note for note in found.notes)
+    assert found.world.movers["Target"].timeline.at(3.0).speed == pytest.approx(4.0)

@@ -165,10 +165,14 @@ def test_relative_lanes_of_oncoming_traffic(tmp_path):
     ("action", "message"),
     [
         (change(4), "road 0 has no lane 4 at 110 m; its lanes are -1, 1"),
-        (change(1.5), "AbsoluteTargetLane value must be the id of a lane, got '1.5'"),
+        (change(1.5), "AbsoluteTargetLane value must be a whole number, got '1.5'"),
         (change(1, value=0.3), "need more than its speed of 10 m/s; give it more time"),
         (change(1, "step"), "a jump of 'Ego' by 3.5 m to the side at 1 s is not supported"),
         (change(1, dimension="distance", value=2000), "the road ends after 890 m, before the action does"),
+        (
+            change(1, dimension="rate", value=0),
+            "LaneChangeActionDynamics value must be > 0 for a rate, got 0",
+        ),
         (change(1, value=-1), "LaneChangeActionDynamics value must be >= 0, got -1"),
         (lane_offset(1, limit='maxLateralAcc="0"'), "maxLateralAcc must be > 0 m/s², got 0"),
         (lane_offset(1, limit=""), "a jump of 'Ego' by 1 m to the side"),

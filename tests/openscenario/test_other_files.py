@@ -1,5 +1,7 @@
 """Files as esmini, ASAM and CARLA write them: what they leave open, and what has no effect."""
 
+import re
+
 import pytest
 from support.openscenario import (
     AWAY,
@@ -148,6 +150,7 @@ def test_catalogs_by_the_name_of_their_file(tmp_path):
         ).contact == pytest.approx(5.6)
 
 
+CAR = re.search("<Vehicle.*</Vehicle>", vehicle("Ego"), re.S)[0]
 COLLISION = '<CollisionCondition><EntityRef entityRef="Target"/></CollisionCondition>'
 
 
@@ -161,8 +164,81 @@ COLLISION = '<CollisionCondition><EntityRef entityRef="Target"/></CollisionCondi
     ],
 )
 def test_collisions_and_the_end_of_the_road(tmp_path, condition, time):
-    found = started(tmp_path, entity_condition(condition))
-    assert found == (None if time is None else pytest.approx(time, abs=1e-6))
+    """The first vehicle has no name of an ego, so that its contacts start events."""
+    events = story("Target", event("E", AWAY, entity_condition(condition, "Car")))
+    init, entities = START.replace('"Ego"', '"Car"'), vehicle("Car") + vehicle("Target")
+    found = segments(tmp_path, events, init, entities=entities)
+    assert [item.start for item in found] == ([] if time is None else [pytest.approx(time, abs=1e-6)])
+
+
+@pytest.mark.parametrize(
+    ("condition", "entity"),
+    [
+        (COLLISION, "Ego"),
+        (COLLISION.replace('<EntityRef entityRef="Target"/>', '<ByType type="vehicle"/>'), "Ego"),
+        (COLLISION.replace('"Target"', '"Ego"'), "Target"),
+    ],
+)
+def test_events_after_a_contact_of_the_ego(tmp_path, condition, entity):
+    """The episode ends with the contact, so that they never start."""
+    events = story("Target", event("E", AWAY, entity_condition(condition, entity)))
+    assert segments(tmp_path, events) == []
+    assert notes(tmp_path, scenario(START, events)) == [
+        "event 'E' waits for a contact of the ego, which ends the episode; it is left out"
+    ]
+
+
+def test_paths_of_other_folders(tmp_path):
+    """A map and catalogs that are relative to a folder above the file, and a catalog that is a file."""
+    inner = tmp_path / "files" / "inner"
+    for folder in (inner / "own", tmp_path / "catalogs", tmp_path / "maps"):
+        folder.mkdir(parents=True)
+    catalog = f'<OpenSCENARIO>{HEADER}<Catalog name="Cars">{CAR}</Catalog></OpenSCENARIO>'
+    for folder in (inner / "own", tmp_path / "catalogs"):
+        (folder / "cars.xosc").write_text(catalog)
+    (tmp_path / "maps" / "road.xodr").write_text(STRAIGHT)
+    entities = '<ScenarioObject name="Ego"><CatalogReference catalogName="Cars" entryName="Ego"/>'
+    entities += "</ScenarioObject>" + vehicle("Target")
+
+    def found(folder):
+        locations = f'<VehicleCatalog><Directory path="{folder}"/></VehicleCatalog>'
+        text = scenario(START, catalogs=locations, entities=entities, road_name="maps/road.xodr")
+        (cell,) = read_cells(write(inner, text))
+        assert cell.compiled.contact == pytest.approx(5.6)
+        return [note.split(": ", 1)[1] for note in cell.compiled.notes]
+
+    above = f"'maps/road.xodr' is relative to {str(tmp_path)!r}, not to the folder of the file"
+    base = str(tmp_path / "files")
+    assert found("../catalogs") == [
+        f"'../catalogs' is relative to {base!r}, not to the folder of the file", above
+    ]  # fmt: skip
+    assert found("own/cars") == ["the catalog is the file 'cars.xosc', not a folder", above]
+    with pytest.raises(ValueError, match="the folder 'nowhere' does not exist; check CatalogLocations"):
+        found("nowhere")
+
+
+def test_empty_actions_of_the_triggering_entities(tmp_path):
+    empty = story("Target", event("E", AWAY, at(1))).replace("false", "true", 1)
+    with pytest.raises(ValueError, match=r"case\.xosc:\d+: selectTriggeringEntities=true is not supported"):
+        compiled(tmp_path, scenario(START, empty))
+    action = f'<Action name="EA"><PrivateAction>{AWAY}</PrivateAction></Action>'
+    empty = empty.replace(action, '<Action name="EA"/>')
+    assert notes(tmp_path, scenario(START, empty)) == ["Action 'EA' is empty and has no effect"]
+
+
+@pytest.mark.parametrize(
+    ("position", "message"),
+    [
+        (lane_position(160, -1.5), "LanePosition laneId must be a whole number, got '-1.5'"),
+        (
+            '<RelativeLanePosition entityRef="Ego" dLane="0.5" ds="60"/>',
+            "RelativeLanePosition dLane must be a whole number, got '0.5'",
+        ),
+    ],
+)
+def test_fractions_of_lanes(tmp_path, position, message):
+    with pytest.raises(ValueError, match=rf"case\.xosc:\d+: {message}"):
+        compiled(tmp_path, scenario(START.replace(lane_position(160), position)))
 
 
 def distance(kind, value, rule="lessThan", freespace="false", more='coordinateSystem="road"'):
@@ -248,10 +324,33 @@ def test_repeated_events(tmp_path):
     )
     found = segments(tmp_path, story("Target", twice))
     assert [(item.start, item.final_speed) for item in found] == [(1.0, 2.0), (2.0, 4.0)]
-    with pytest.raises(ValueError, match="maximumExecutionCount must be a whole number >= 0, got -1"):
-        segments(
-            tmp_path, story("Target", twice.replace('"2"/>', '"2"/>').replace('Count="2"', 'Count="-1"'))
-        )
+    with pytest.raises(ValueError, match="maximumExecutionCount must be >= 0, got -1"):
+        segments(tmp_path, story("Target", twice.replace('Count="2"', 'Count="-1"')))
+
+
+def grouped(*events, count):
+    return story("Target", *events).replace(
+        '"G" maximumExecutionCount="1"', f'"G" maximumExecutionCount="{count}"'
+    )
+
+
+def test_repeated_groups(tmp_path):
+    """To 2 m/s within 1 s, then back to 0 within 1 s; the group begins again when both are complete."""
+    done = (
+        '<StoryboardElementStateCondition storyboardElementType="event" storyboardElementRef="A" state="{}"/>'
+    )
+    first = event("A", speed(2, "rate", "linear", 2), at(1))
+    second = event("B", speed(0, "rate", "linear", 2), value_condition(done.format("completeState")))
+    found = segments(tmp_path, grouped(first, second, count=2))
+    assert [(round(item.start, 6), item.final_speed) for item in found] == [(1, 2), (2, 0), (3, 2), (4, 0)]
+    assert len(segments(tmp_path, grouped(first, second, count=3))) == 6
+    # A rising edge of the time is there once: the second execution never ends.
+    once = event("B", speed(0, "rate", "linear", 2), at(2.5).replace('Edge="none"', 'Edge="rising"'))
+    text = scenario(START, grouped(first, once, count=3))
+    compiled_once = compiled(tmp_path, text)
+    found = compiled_once.world.movers["Target"].timeline.segments
+    assert [(round(item.start, 6), item.final_speed) for item in found] == [(1, 2), (2.5, 0), (3.5, 2)]
+    assert compiled_once.notes == ()
 
 
 def test_keeping_the_speed_of_another(tmp_path):

@@ -2,14 +2,18 @@
 
 import pytest
 from support.openscenario import (
+    FAST,
     HEADER,
     START,
     compiled,
     element,
+    lane_position,
     parameter,
     scenario,
+    teleport,
     values,
     variation,
+    varied,
     write,
 )
 
@@ -138,7 +142,8 @@ def test_ranges_include_a_limit_that_the_steps_reach(tmp_path, low, high, step, 
         (stepped("v", 0, 999, 1) + stepped("w", 0, 999, 1), "more than 100000 cells"),
         (values("v", 1) + values("v", 2), r"part\.xml:3: parameter v is varied twice"),
         (values("v"), "the distribution of v has no value"),
-        (joint({"a": 1}, {"b": 1}), "must assign the same parameters"),
+        (joint(), "must contain a ParameterValueSet"),
+        (joint({"a": 1}, {"b": 1}) + values("b", 1), "parameter b is varied twice"),
         ("<UserDefinedDistribution/>", "UserDefinedDistribution is not supported"),
     ],
 )
@@ -197,3 +202,14 @@ def test_paths_with_backslashes(tmp_path):
     assert len(read(path).cases) == 1
     path.write_text(variation("", r".\sub\case.xosc"))
     assert len(read(path).cases) == 1
+
+
+def test_sets_of_different_parameters(tmp_path):
+    """A parameter that a set leaves out has its value of the scenario."""
+    declared = parameter("Ego_speed_kph", "36") + parameter("Place", "160")
+    init = FAST + teleport("Target", lane_position("$Place"))
+    sets = joint({"Ego_speed_kph": 72}, {"Place": 150}, {"Ego_speed_kph": 54, "Place": 140})
+    cells = read_cells(varied(tmp_path, sets, parameters=declared, init=init))
+    assert [cell.compiled.scenario.ego_speed for cell in cells] == pytest.approx([20.0, 10.0, 15.0])
+    assert [cell.compiled.contact for cell in cells] == pytest.approx([56 / 20, 46 / 10, 36 / 15])
+    assert [cell.variant for cell in cells] == ["v72", "v36", "v54"]

@@ -262,7 +262,7 @@ def test_an_episode_keeps_the_acceleration_of_the_target(tmp_path):
         ),
         (
             ('maximumExecutionCount="1"', 'maximumExecutionCount="0.5"'),
-            "ManeuverGroup maximumExecutionCount must be a whole number >= 0, got 0.5",
+            "ManeuverGroup maximumExecutionCount must be a whole number, got '0.5'",
         ),
         (('name="Ego"', 'name="Car"'), r"unknown entity 'Ego'"),
         (('name="Target"', 'name="Ego"'), "ScenarioObject name 'Ego' is used twice; choose another"),

@@ -16,10 +16,11 @@ from support.openscenario import (
 )
 
 from lgmd_gym.envs.dynamics.script import Bend
+from lgmd_gym.openscenario.bodies import EntityBody
 from lgmd_gym.openscenario.motion import Place, Track, section
 from lgmd_gym.openscenario.parameters import Catalogs
 from lgmd_gym.openscenario.roads import read_roads
-from lgmd_gym.openscenario.world import EntityBody, Mover, ScenarioMap
+from lgmd_gym.openscenario.world import Mover, ScenarioMap
 
 CAR = EntityBody(kind="car", length=4.0, width=2.0, height=1.5, reference=0.0)
 
@@ -76,7 +77,7 @@ def test_left_hand_traffic(tmp_path):
         (road_file(road(0, 0, 0, 0, 9, link="successor:1:middle")), "contactPoint='middle' is not supported"),
         (
             STRAIGHT.replace("\n", "").replace('lane id="-1"', 'lane id="-1.5"'),
-            "lane id must be a whole number, got -1.5",
+            "lane id must be a whole number, got '-1.5'",
         ),
         (road_file(road(0, 0, 0, 0, 9, "<poly3 a='0'/>")), "poly3 in geometry is not supported; use line"),
         (
@@ -99,6 +100,28 @@ def test_routes_turn_through_junctions(tmp_path):
     ]  # fmt: skip
     with pytest.raises(ValueError, match="no way from road 0 to road 2"):
         roads.route("0", -1, "2")
+
+
+def direct(linked="2"):
+    """Return roads 1 and 2 that follow road 0 at a direct junction, without connecting roads."""
+    text = road_file(road(0, 0, 0, 0, 100), road(1, 100, 0, 0, 50), road(2, 100, 0, 0, 60))
+    end = '<link><successor elementType="junction" elementId="9"/></link>'
+    connections = "".join(
+        f'<connection id="{other}" incomingRoad="0" linkedRoad="{other}" contactPoint="start"/>'
+        for other in ("1", linked)
+    )
+    junction = f'<junction id="9" type="direct">{connections}</junction></OpenDRIVE>'
+    return text.replace("<link></link>", end, 1).replace("</OpenDRIVE>", junction)
+
+
+def test_direct_junctions(tmp_path):
+    roads = network(tmp_path, direct())
+    assert [(item.name, side) for item, side in roads.route("0", 1, "2")] == [("0", 1), ("2", 1)]
+    assert [(item.name, side) for item, side in roads.route("2", -1, "0")] == [("2", -1), ("0", -1)]
+    assert sorted(roads.after("0", "end")) == [("1", "start"), ("2", "start")]
+    assert list(roads.after("1", "start")) == [("0", "end")]
+    with pytest.raises(ValueError, match=r"road\.xodr:\d+: road 0 or 3 is not at junction 9"):
+        network(tmp_path, direct("3"))
 
 
 # An entity 3 m to the right of road 0 at s = 20 m, 0.1 rad to the left of the road's direction.

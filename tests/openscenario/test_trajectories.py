@@ -1,6 +1,6 @@
 """Trajectories: corners, times, NURBS, and jumps of the speed, by hand."""
 
-from math import hypot
+from math import cos, hypot, sin
 
 import pytest
 from support.openscenario import (
@@ -17,7 +17,7 @@ from support.openscenario import (
     world_position,
 )
 
-from lgmd_gym.openscenario.motion import Timeline
+from lgmd_gym.openscenario.motion import Place, Timeline
 
 
 def follow(shape, timing="<None/>"):
@@ -47,6 +47,29 @@ def target(folder, action, init="", time=None):
                     speed(10))  # fmt: skip
     own = private("Target", action) if time is None else init
     return compiled(folder, scenario(start + own, events))
+
+
+def test_a_corner_where_a_trajectory_begins(tmp_path):
+    """The ego turns by 0.2 rad at s = 110 m, at 1 s: it follows the line within 0.1 m and has its heading."""
+    start = private(
+        "Ego", f"<TeleportAction><Position>{lane_position(100)}</Position></TeleportAction>", speed(10)
+    )
+    line = follow(polyline((110, -1.75), (110 + 50 * cos(0.2), -1.75 + 50 * sin(0.2))))
+    found = compiled(
+        tmp_path,
+        scenario(start + teleport("Target", lane_position(900)), story("Ego", event("E", line, at(1)))),
+    )
+    mover = found.world.movers["Ego"]
+    assert mover.place(1.0).heading == pytest.approx(0.0)
+    line = Place(110.0, -1.75, 0.2)
+    beside = [mover.place(1.0 + 0.05 * step).seen_from(line).y for step in range(60)]
+    assert max(map(abs, beside)) < 0.1
+    seen = mover.place(4.0).seen_from(line)
+    assert seen == pytest.approx((30.0, 0.0, 0.0), abs=0.02)
+    assert any("the path of 'Ego' has a corner of 0.2 rad, which is rounded" in note for note in found.notes)
+    wide = follow(polyline((110, -1.75), (110 + 50 * cos(0.6), -1.75 + 50 * sin(0.6))))
+    with pytest.raises(ValueError, match="'Ego' is not on its path at 1 s"):
+        compiled(tmp_path, scenario(START, story("Ego", event("E", wide, at(1)))))
 
 
 def test_a_polyline_with_a_corner(tmp_path):

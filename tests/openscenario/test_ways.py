@@ -62,8 +62,23 @@ def test_rounded_corners():
     assert slight.deviation == pytest.approx(0.05)
     with pytest.raises(ValueError, match=r"a corner of 3.14 rad at x=5, y=0 is too sharp"):
         round_corners([(0.0, 0.0), (5.0, 0.0), (0.0, 0.0)])
-    with pytest.raises(ValueError, match=r"a corner of 1.57 rad at x=0.5, y=0 is too sharp"):
-        round_corners([(0.0, 0.0), (0.5, 0.0), (0.5, 0.5)])
+    with pytest.raises(ValueError, match=r"a corner of 1.57 rad at x=0.4, y=0 is too sharp"):
+        round_corners([(0.0, 0.0), (0.4, 0.0), (0.4, 0.4)])
+
+
+def test_corners_between_short_segments():
+    """A radius below 1 m, where a segment that is straight at its other end has room in its whole length."""
+    short = round_corners([(0.0, 0.0), (0.6, 0.0), (0.6, 0.6)])
+    assert [bend.length for bend in short.bends] == pytest.approx([0.6 * pi / 2])
+    assert short.bends[0].curvature == pytest.approx(1.0 / 0.6)
+    # A straight vertex at (1, 0) leaves the whole 0.8 m after it.
+    straight = round_corners([(0.0, 0.0), (1.0, 0.0), (1.8, 0.0), (1.8, 5.0)])
+    assert [bend.length for bend in straight.bends] == pytest.approx([1.0, 0.8 * pi / 2, 4.2])
+    # A segment between two corners is shared; it has room for 0.5 m and not for less.
+    steps = [(0.0, 0.0), (5.0, 0.0), (5.0, 1.0), (10.0, 1.0)]
+    assert max(bend.curvature for bend in round_corners(steps).bends) == pytest.approx(2.0)
+    with pytest.raises(ValueError, match=r"a corner of 1.57 rad at x=5, y=0 .* at least 0.5 m"):
+        round_corners([(0.0, 0.0), (5.0, 0.0), (5.0, 0.98), (10.0, 0.98)])
 
 
 def test_nurbs_of_a_quarter_circle():
