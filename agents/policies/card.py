@@ -9,6 +9,7 @@ import zipfile
 import zlib
 from dataclasses import MISSING, replace
 from errno import EFBIG
+from math import inf
 from pathlib import Path, PureWindowsPath
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 
@@ -219,7 +220,7 @@ def policy_card(path: Path) -> PolicyCard:
 def write_card(path: Path, card: Values) -> None:
     """Add a card to the zip file of a stable-baselines3 model."""
     with zipfile.ZipFile(path, "a") as file:
-        file.writestr(CARD, json.dumps(card, indent=1))
+        file.writestr(CARD, _as_json(card))
 
 
 def save_policy(model: "BaseAlgorithm", file: str | Path, env: TrainingEnv | None = None) -> Path:
@@ -274,7 +275,19 @@ def save_card(file: str | Path, env: TrainingEnv, algo: str, vec_normalize: str 
 
 def _write(path: Path, card: PolicyCard) -> None:
     with complete_file(card_file(path)) as part:
-        part.write_text(json.dumps(card.to_dict(), indent=1) + "\n", "utf-8")
+        part.write_text(_as_json(card.to_dict()) + "\n", "utf-8")
+
+
+def _as_json(card: Values) -> str:
+    """Return a card as JSON, which has no infinity: infinite numbers are defaults (`release_s`), left out."""
+    return json.dumps(_finite(card), indent=1, allow_nan=False)
+
+
+def _finite(value: object) -> object:
+    if not isinstance(value, dict):
+        return value
+    items = cast("Values", value).items()
+    return {name: _finite(item) for name, item in items if item != inf}
 
 
 def _normalizer(env: TrainingEnv) -> "VecNormalize | None":

@@ -8,6 +8,8 @@ from lgmd_gym.errors import check_flag, check_whole
 from lgmd_gym.fields import Record, number, record
 from lgmd_gym.kernels import kernel
 
+EMERGENCY = 5.0
+"""Deceleration of emergency braking [m/s²], UN R152 Rev.2, 5.2.1.2."""
 DELAY_LINE = np.dtype(
     [("time", np.float64), ("demand", np.float64), ("last_put", np.float64), ("count", np.int64)]
 )

@@ -19,11 +19,10 @@ from bisect import bisect_left
 from dataclasses import dataclass
 from math import inf
 
-from lgmd_gym.envs.dynamics.brake import BrakeParams
+from lgmd_gym.envs.dynamics.brake import EMERGENCY, BrakeParams
 from lgmd_gym.envs.traffic.env import TrafficEnv
 
 HORIZON = 3.0  # [s], a brake is needed if an emergency follows within this time
-EMERGENCY = 5.0  # [m/s²], required deceleration of an emergency
 EMERGENCY_SHARE = EMERGENCY / BrakeParams().max_deceleration  # the same, as a share of full braking
 
 

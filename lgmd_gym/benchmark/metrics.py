@@ -15,12 +15,12 @@ from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.case import CASE_KEYS, ID_KEYS, Case, Row, new_row, relative_impact
 from lgmd_gym.benchmark.episode import Episode
 from lgmd_gym.camera import CLEAR
+from lgmd_gym.envs.dynamics.brake import EMERGENCY
 
 GRAVITY = 9.80665  # [m/s²]
 NUISANCE = 0.25 * GRAVITY  # 49 CFR 571.127 S5.3: a false activation exceeds this beyond the driver's braking
 # Euro NCAP AEB C2C v4.3.1, 2.1: braking begins at the last value below ONSET before the first above BRAKING.
 BRAKING, ONSET = 1.0, 0.3  # [m/s²]
-EMERGENCY = 5.0  # [m/s²], start of emergency braking in UN R152 Rev.2, 5.2.1.2
 PREMATURE = 4.0  # [s] before the counterfactual contact; the protocols' T0
 
 Value = tuple[Any, bool]

@@ -122,7 +122,11 @@ def play_episode(
     checked_overlays(overlays)
     sensors = (sensors or SensorConfig()).for_agent(agent)
     with ExitStack() as stack:
-        config = {} if _is_traffic(target) else agent.config
+        config = agent.config
+        if _is_traffic(target) and config:
+            raise ValueError(
+                f"agent {agent.name} requires braking environments, got traffic {target}; use ttc-oracle"
+            )
         options = with_config({**sensors.arguments, **(surroundings or {})}, config)
         env = make_target(target, arguments, **options)
         stack.callback(env.close)

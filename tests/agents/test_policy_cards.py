@@ -3,6 +3,7 @@
 import json
 import os
 import zipfile
+from math import inf
 
 import gymnasium as gym
 import pytest
@@ -230,3 +231,19 @@ def test_save_policy_needs_an_environment(model, tmp_path):
     model.save(tmp_path / "model.zip")
     with pytest.raises(ValueError, match="pass the training environment as env"):
         save_policy(PPO.load(tmp_path / "model.zip", device="cpu"), tmp_path / "again.zip")
+
+
+def test_cards_without_infinity(tmp_path):
+    """A brake that latches has an infinite `release_s`, the default, which JSON cannot state."""
+    brake = {"full_odds": 1.0}
+    card = PolicyCard(algo="ppo", camera="fovea", features={"inputs": ["ego_speed"]}, brake=brake)
+    assert card.brake.release_s == inf
+    file = tmp_path / "policy.zip"
+    with zipfile.ZipFile(file, "w") as archive:
+        archive.writestr("policy.pth", b"")
+    card_module.write_card(file, card.to_dict())
+    with zipfile.ZipFile(file) as archive:
+        text = archive.read("lgmd_gym.json").decode()
+    assert "Infinity" not in text
+    assert "release_s" not in json.loads(text)["brake"]
+    assert card_module.policy_card(file) == card

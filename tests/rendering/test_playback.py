@@ -108,6 +108,13 @@ def test_invalid_targets_raise(target, arguments, message):
         make_target(target, arguments)
 
 
+@pytest.mark.parametrize("target", ["traffic/merge", "traffic-inattentive/merge", "LGMD/Traffic-Merge-v0"])
+def test_the_bound_has_no_forecast_in_traffic(target):
+    message = f"agent last-moment-oracle requires braking environments, got traffic {target}; use ttc-oracle"
+    with pytest.raises(ValueError, match=message):
+        play_episode(target, make_agent("last-moment-oracle"), 0, {})
+
+
 @pytest.mark.parametrize(
     ("target", "identity"),
     [

@@ -10,8 +10,9 @@ from lgmd_gym.benchmark.traffic.branch import Branch, avoids, fork
 from lgmd_gym.benchmark.traffic.reader import Moment, SceneReader
 from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.attention import Attention
+from lgmd_gym.envs.dynamics.brake import EMERGENCY
 from lgmd_gym.envs.registration import make_traffic
-from lgmd_gym.envs.traffic.emergencies import EMERGENCY, EMERGENCY_SHARE, HORIZON, Emergencies
+from lgmd_gym.envs.traffic.emergencies import EMERGENCY_SHARE, HORIZON, Emergencies
 from lgmd_gym.envs.traffic.env import JAM_SPEED, TrafficEnv
 from lgmd_gym.sensing.sensor_array import SensorArray
 

@@ -9,8 +9,9 @@ from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.metrics import NUISANCE
 from lgmd_gym.benchmark.traffic.branch import Branch
 from lgmd_gym.benchmark.traffic.recording import TrafficRecording
+from lgmd_gym.envs.dynamics.brake import EMERGENCY
 from lgmd_gym.envs.surrogate_safety import PREDICTION
-from lgmd_gym.envs.traffic.emergencies import EMERGENCY, HORIZON
+from lgmd_gym.envs.traffic.emergencies import HORIZON
 
 LOOK_AHEAD = HORIZON + PREDICTION  # [s], latest contact that a needed brake can have been for
 AFTERMATH = 5.0  # [s] after its last demand or standstill in which a braking event can cause a contact

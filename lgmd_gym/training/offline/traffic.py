@@ -23,11 +23,11 @@ from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.benchmark.traffic.branch import fork
 from lgmd_gym.camera.scene import WEATHERS
 from lgmd_gym.envs.attention import INATTENTIVE
-from lgmd_gym.envs.dynamics.brake import BrakeParams
+from lgmd_gym.envs.dynamics.brake import EMERGENCY, BrakeParams
 from lgmd_gym.envs.families.distribution import draw_weather
 from lgmd_gym.envs.registration import TRAFFIC_KINDS, make_traffic
 from lgmd_gym.envs.reward import RewardParams
-from lgmd_gym.envs.traffic.emergencies import EMERGENCY, Emergencies, simulate_driver
+from lgmd_gym.envs.traffic.emergencies import Emergencies, simulate_driver
 from lgmd_gym.envs.traffic.env import JAM_SPEED, TrafficEnv
 from lgmd_gym.neuron import NeuronSpec
 from lgmd_gym.sensing.channel import ChannelSpec
