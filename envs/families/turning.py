@@ -106,12 +106,13 @@ def turn_towards_pedestrian(
 
     The pedestrian walks at 5 km/h on a line 9.5 m beside the centre line of the ego's road. Without braking,
     its hip is on the ego's centreline at the contact. Source: Euro NCAP AEB VRU v4.5.1: left (far side) in
-    the same and the opposite direction at 10 to 20 km/h, right (near side) at 10 km/h.
+    the same and the opposite direction at 10 to 20 km/h, right (near side) at 10 km/h with an arc of its own.
     """
     ahead, line = DIRECTIONS[direction], _pedestrian_line(left)
-    ego = turning_ego(ego_speed, left, _pedestrian_contact(turn_of(ego_speed), left, ahead))
-    # The pedestrian starts 6 m before the contact if it comes from the far kerb, else 9.5 m.
-    start = 6.0 if left and direction == "opposite" else 9.5
+    ego = turning_ego(ego_speed, left, _pedestrian_contact(turn_of(ego_speed, left), left, ahead))
+    # The pedestrian starts 6 m before the contact if it comes from the kerb beside the ego's lane of the
+    # crossing road, else 9.5 m.
+    start = 6.0 if left == (direction == "opposite") else 9.5
     run = run_up(ego.contact, 5 * KMH, start - 2.0, 2.0)
     hip = ego.front.x + _hip(ego.front, line)[0]
     centre = hip - ahead * (ADULT.impact_point + run.distance)
@@ -214,6 +215,8 @@ class Turn:
 
 # Highest ego speed [km/h] of each turn, Euro NCAP Frontal Collisions v1.1, 1.2.4.
 TURNS = {10: Turn(9.0, 20.62, 48.76), 15: Turn(11.75, 20.93, 48.14), 25: Turn(14.75, 21.79, 46.42)}
+# To the right there is one of 10 km/h, as in Vector's files of CPTA; others are those to the left, mirrored.
+RIGHT_TURNS = {**TURNS, 10: Turn(8.0, 22.85, 44.3)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -238,9 +241,10 @@ class TurningEgo:
         )
 
 
-def turn_of(speed: float) -> Turn:
-    """Return the turn that the ego drives at a speed [m/s]."""
-    return next(turn for limit, turn in TURNS.items() if speed <= (limit + 0.02) * KMH)
+def turn_of(speed: float, left: bool = True) -> Turn:
+    """Return the turn that the ego drives at a speed [m/s], to the left or right."""
+    turns = TURNS if left else RIGHT_TURNS
+    return next(turn for limit, turn in turns.items() if speed <= (limit + 0.02) * KMH)
 
 
 def turning_ego(speed: float, left: bool, contact: tuple[float, Pose]) -> TurningEgo:
@@ -254,7 +258,7 @@ def turning_ego(speed: float, left: bool, contact: tuple[float, Pose]) -> Turnin
     # A module that loads numba; the registration of the scenario families must not.
     from lgmd_gym.envs.dynamics.path import Path
 
-    turn, (way, front) = turn_of(speed), contact
+    turn, (way, front) = turn_of(speed, left), contact
     straight = max(BEFORE_TURN * speed, START_TTC * speed - way)
     length = sum(bend.length for bend in turn.bends(left))
     # End of the front axle's turn along the initial heading, from the turn's start.

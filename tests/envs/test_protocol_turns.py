@@ -18,11 +18,13 @@ from lgmd_gym.envs.families.turning import turn_of
 
 SMALL = {"length": 4.316, "width": 1.79, "height": 1.48}
 LARGE = {"length": 4.418, "width": 1.82, "height": 1.533}
-# Ego speeds [km/h], radius of the arc [m], changes of heading on each clothoid and on the arc [degrees].
+# Whether to the left, ego speeds [km/h], radius of the arc [m], changes of heading on each clothoid and on
+# the arc [degrees]. To the right at 10 km/h as in the parameters CPTAno and CPTAns of Vector's files.
 TURNS = [
-    ((5, 10), 9.0, 20.62, 48.76),
-    ((10.1, 15), 11.75, 20.93, 48.14),
-    ((15.1, 20, 25), 14.75, 21.79, 46.42),
+    (True, (5, 10), 9.0, 20.62, 48.76),
+    (False, (5, 10), 8.0, 22.85, 44.3),
+    *((left, (10.1, 15), 11.75, 20.93, 48.14) for left in (True, False)),
+    *((left, (15.1, 20, 25), 14.75, 21.79, 46.42) for left in (True, False)),
 ]
 
 compiled_only = pytest.mark.skipif(config.DISABLE_JIT, reason="an environment needs compilation")
@@ -32,11 +34,10 @@ def kmh(value):
     return value / 3.6
 
 
-@pytest.mark.parametrize(("speeds", "radius", "clothoid", "arc"), TURNS)
-@pytest.mark.parametrize(("left", "sign"), [(True, 1), (False, -1)])
-def test_turns_of_the_front_axle(speeds, radius, clothoid, arc, left, sign):
+@pytest.mark.parametrize(("left", "speeds", "radius", "clothoid", "arc"), TURNS)
+def test_turns_of_the_front_axle(left, speeds, radius, clothoid, arc):
     """Clothoids from 1500 m to the radius of the arc; their mean curvature times length is the angle."""
-    low, high = 1 / 1500, 1 / radius
+    low, high, sign = 1 / 1500, 1 / radius, 1 if left else -1
     eased = radians(clothoid) / ((low + high) / 2)
     expected = [
         (eased, sign * low, sign * high),
@@ -44,15 +45,14 @@ def test_turns_of_the_front_axle(speeds, radius, clothoid, arc, left, sign):
         (eased, sign * high, sign * low),
     ]
     for speed in speeds:
-        assert shape(turn_of(kmh(speed)).bends(left)) == expected
+        assert shape(turn_of(kmh(speed), left).bends(left)) == expected
     assert 2 * clothoid + arc == pytest.approx(90.0)
 
 
-@pytest.mark.parametrize("speed", [10, 15, 25])
-def test_the_ego_drives_the_turn_with_its_front_axle(speed):
-    """The front axle, a wheelbase ahead of the rear one, is on the turn integrated in fine steps, to 1 mm."""
+def integrated(turn):
+    """Return the places of a turn to the left, integrated in fine steps, shape (steps, 2) [m]."""
     heading, places = 0.0, [np.zeros(2)]
-    for bend in turn_of(kmh(speed)).bends(left=True):
+    for bend in turn.bends(left=True):
         step = bend.length / 2000
         for part in (np.arange(2000) + 0.5) / 2000:
             turned = step * (bend.curvature + part * (bend.last_curvature - bend.curvature))
@@ -60,11 +60,18 @@ def test_the_ego_drives_the_turn_with_its_front_axle(speed):
             places.append(places[-1] + step * np.array([cos(heading), sin(heading)]))
             heading += turned / 2
     assert heading == pytest.approx(pi / 2)
-    turn = np.array(places)
+    return np.array(places)
+
+
+@pytest.mark.parametrize("speed", [10, 15, 25])
+def test_the_ego_drives_the_turn_with_its_front_axle(speed):
+    """The front axle, a wheelbase ahead of the rear one, is on the integrated turn, to 1 mm."""
+    turn = integrated(turn_of(kmh(speed)))
     for left, sign in ((True, 1), (False, -1)):
         made = scenario("CPTA", ego_speed=kmh(speed), left=left)
         # The turn ends in a lane of the crossing road: beyond its centre, or, to the right, before it.
-        end = 1.335 + made.ego_path[0].length + turn[-1, 0]
+        places = integrated(turn_of(kmh(speed), left))
+        end = 1.335 + made.ego_path[0].length + places[-1, 0]
         assert made.road.distance == pytest.approx(end - sign * 1.75, abs=0.001)
     made = scenario("CCFtap", ego_speed=kmh(speed))
     path, straight = Path(Pose(0.0, 0.0, 0.0), made.ego_path), made.ego_path[0].length
@@ -90,6 +97,7 @@ def turn_step(turn):
         (True, "same", 9.5, (10, 15, 20)),
         (True, "opposite", 6.0, (10, 15, 20)),
         (False, "opposite", 9.5, (10,)),
+        (False, "same", 6.0, (10,)),
     ],
 )
 def test_run_up_of_the_turning_pedestrian(left, direction, start, speeds):
