@@ -239,7 +239,7 @@ def _cells(
         family = file_name(scope.get(FAMILY, file.stem))
         cells.append(compile_scenario(Element(root, scope), family))
         given_here = {name: item.value for name, item in assignments.items()}
-        varied.append({name: given_here.get(name, scope[name]) for name in names})
+        varied.append({name: given_here.get(name, scope.get(name, "")) for name in names})
     if violations:
         if not cells:
             raise violations[0]

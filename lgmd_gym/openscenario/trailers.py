@@ -10,7 +10,7 @@ from lgmd_gym.openscenario.world import Mover, ScenarioMap
 
 STEP = 0.5
 """Length of the bends of a trailer's path [m]."""
-_STRAIGHT = 1e-4  # [rad] between vehicle and trailer, below which the path ends with a straight
+_STRAIGHT = 1e-6  # [rad] between vehicle and trailer, below which the path ends with a straight
 _SETTLING = 20.0  # coupler lengths after the last bend within which a trailer is behind its vehicle again
 _LONGEST = 5000.0  # [m] of a path
 _EXACT, _LIMIT = 0.1, 0.5  # [m] of deviation above which there is a note, and an error
