@@ -10,6 +10,7 @@ from lgmd_gym.openscenario.world import Mover, ScenarioMap
 
 STEP = 0.5
 """Length of the bends of a trailer's path [m]."""
+_SAMPLE = 2.0  # [m]
 _STRAIGHT = 1e-6  # [rad] between vehicle and trailer, below which the path ends with a straight
 _SETTLING = 20.0  # coupler lengths after the last bend within which a trailer is behind its vehicle again
 _LONGEST = 5000.0  # [m] of a path
@@ -21,15 +22,15 @@ class Followed(NamedTuple):
 
     track: Track  # path of its axle
     share: float  # distance along it per distance of the vehicle, on average; 1 where that is exact
-    lengths: tuple[float, ...]  # distance of the axle after each step of the vehicle [m]
+    apart: tuple[
+        float, ...
+    ]  # distance of its coupler from the hitch after every `_SAMPLE` of the vehicle [m]
 
     def deviation(self, distance: float) -> float:
-        """Return the largest distance from its place until a distance of the vehicle [m]."""
-        last = min(int(distance / STEP) + 1, len(self.lengths))
-        places = [(number * STEP, length) for number, length in enumerate(self.lengths[:last], 1)]
-        if places and distance > places[-1][0]:  # straight on
-            places.append((distance, places[-1][1] + distance - places[-1][0]))
-        return max((abs(length - driven * self.share) for driven, length in places), default=0.0)
+        """Return the largest distance of its coupler from the hitch until a distance of the vehicle [m]."""
+        covered = len(self.apart) * _SAMPLE
+        straight_on = max(distance - covered, 0.0) * (1.0 - self.share)
+        return max(self.apart[: int(distance / _SAMPLE) + 1], default=0.0) + straight_on
 
 
 class Pulled(NamedTuple):
@@ -69,7 +70,7 @@ def follow_hitch(path: Track, trailer: Trailer) -> Followed:
     def turn(angle: float, curvature: float) -> float:
         return (sin(angle) + hitch * curvature * cos(angle)) / coupler
 
-    turns, lengths, length, angle = list[float](), list[float](), 0.0, 0.0
+    turns, bent, angle = list[float](), 0.0, 0.0
     end = min(path.length, _LONGEST)
     while len(turns) * STEP < end or (
         abs(angle) > _STRAIGHT and len(turns) * STEP < end + _SETTLING * coupler
@@ -77,13 +78,16 @@ def follow_hitch(path: Track, trailer: Trailer) -> Followed:
         curvature = path.curvature((len(turns) + 0.5) * STEP)
         half = angle + STEP / 2 * (curvature - turn(angle, curvature))
         turns.append(turn(half, curvature))
-        length += (cos(half) - hitch * curvature * sin(half)) * STEP
-        lengths.append(length)
+        if len(turns) * STEP <= end:
+            bent += (cos(half) - hitch * curvature * sin(half)) * STEP
         angle += STEP * (curvature - turns[-1])
-    shorter = len(turns) * STEP - length
-    share = length / (len(turns) * STEP) if abs(shorter) > _EXACT else 1.0
+    whole = int(end / STEP) * STEP
+    share = bent / whole if abs(whole - bent) > _EXACT else 1.0
     bends = tuple(Bend(STEP * share, item / share) for item in turns) if any(turns) else ()
-    return Followed(Track(path.start.moved(hitch - coupler), bends), share, tuple(lengths))
+    track = Track(path.start.moved(hitch - coupler), bends)
+    places = [number * _SAMPLE for number in range(1, int(len(turns) * STEP / _SAMPLE) + 1)] if bends else []
+    apart = [path.at(place).moved(hitch).distance(track.at(place * share).moved(coupler)) for place in places]
+    return Followed(track, share, tuple(apart))
 
 
 def pulled_by(mover: Mover) -> list[Pulled]:
