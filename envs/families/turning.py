@@ -109,10 +109,12 @@ def turn_towards_pedestrian(
     the same and the opposite direction at 10 to 20 km/h, right (near side) at 10 km/h with an arc of its own.
     """
     ahead, line = DIRECTIONS[direction], _pedestrian_line(left)
-    ego = turning_ego(ego_speed, left, _pedestrian_contact(turn_of(ego_speed, left), left, ahead))
+    turn = turn_of(ego_speed, left)
+    ego = turning_ego(ego_speed, left, _pedestrian_contact(turn, left, ahead))
     # The pedestrian starts 6 m before the contact if it comes from the kerb beside the ego's lane of the
-    # crossing road, else 9.5 m.
-    start = 6.0 if left == (direction == "opposite") else 9.5
+    # crossing road, else 9.5 m. Faster right turns are of numbered levels only, which do not change.
+    beside = direction == "opposite" if left else direction == "same" and turn is RIGHT_TURNS[10]
+    start = 6.0 if beside else 9.5
     run = run_up(ego.contact, 5 * KMH, start - 2.0, 2.0)
     hip = ego.front.x + _hip(ego.front, line)[0]
     centre = hip - ahead * (ADULT.impact_point + run.distance)
@@ -215,7 +217,7 @@ class Turn:
 
 # Highest ego speed [km/h] of each turn, Euro NCAP Frontal Collisions v1.1, 1.2.4.
 TURNS = {10: Turn(9.0, 20.62, 48.76), 15: Turn(11.75, 20.93, 48.14), 25: Turn(14.75, 21.79, 46.42)}
-# To the right there is one of 10 km/h, as in Vector's files of CPTA; others are those to the left, mirrored.
+# To the right there is one of 10 km/h, as in Vector's files of CPTA; faster ones mirror those to the left.
 RIGHT_TURNS = {**TURNS, 10: Turn(8.0, 22.85, 44.3)}
 
 
