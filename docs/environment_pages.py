@@ -20,6 +20,8 @@ VIDEO_AGENT = "spike-threshold"
 _NO_THREAT = "; not a threat."
 _AGENT_NOTES = {
     "random": "draws every action from the action space",
+    "spike-threshold": "is the rule of the paper, which brakes far too early in worlds: the camera moves, "
+    "and the roadside passes",
     "ttc-oracle": "reads the true time to contact",
 }
 
@@ -60,7 +62,8 @@ def environment_page(card: ScenarioCard, returns: Sequence[Returns]) -> str:
         parts["Description"],
         _example(name),
         f"## Action space\n\n{parts['Action Space']}",
-        "## Observation space\n\nA `Dict`. With the default arguments, its entries are:",
+        "## Observation space\n\nA `Dict` with these entries; `frame` only with `include_frame=True`, and "
+        "`base` only with `include_base=True`:",
         observation_table(observation),
         f"`base`, the environment's own observation: {parts['Observation Space'].split('. ')[0]}.",
         f"## Rewards\n\n{parts['Rewards']}",

@@ -8,16 +8,19 @@ import sys
 from pathlib import Path
 
 import pytest
+from joblib.externals.loky import reusable_executor
 from support.processes import wait_for_rows
 from support.runs import read_rows, sorted_keys
 
 from lgmd_gym.cli import main as cli
+from lgmd_gym.processes.pool import Executor, end_workers
 
 LGMD = [sys.executable, "-m", "lgmd_gym"]
 
 
 def bench(out, *more):
-    arguments = ["--agents", "spike-threshold", "ttc-oracle", "--seeds", "1", "--no-plots", "--no-report"]
+    arguments = ["--suite", "quick", "--agents", "spike-threshold", "ttc-oracle", "--seeds", "1"]
+    arguments += ["--no-plots", "--no-report"]
     return [*LGMD, "bench", "--out", str(out), *arguments, *more]
 
 
@@ -46,6 +49,23 @@ def test_killed_worker_process_is_reported_and_loses_no_other_row(complete_run, 
     assert 10 <= before < 57
     assert cli.run(["bench", "--resume", str(out), "--jobs", "1", "--no-plots", "--no-report"]) == 0
     assert (out / "summary.csv").read_bytes() == (complete_run / "summary.csv").read_bytes()
+
+
+def test_idle_workers_end_at_once_and_new_ones_can_start():
+    processes = set()
+    for _ in range(2):
+        with Executor(2).open() as run_tasks:
+            processes |= set(run_tasks(pid_of, range(4)))
+        started = list(reusable_executor._executor._processes.values())
+        end_workers()
+        assert started
+        assert not any(process.is_alive() for process in started)
+    assert os.getpid() not in processes
+    end_workers()  # without workers
+
+
+def pid_of(_):
+    return os.getpid()
 
 
 @pytest.fixture
