@@ -166,6 +166,12 @@ def test_generated_pages_and_pictures_are_made_by_the_build():
             assert name in names, f"{path.name}: {name}"
 
 
+def test_every_object_is_described_once():
+    """Sphinx warns of a second description, and the build takes warnings as errors."""
+    found = [name for path in PAGES for name in re.findall(r"^\.\. auto\w+:: (\S+)", path.read_text(), re.M)]
+    assert [name for name in found if found.count(name) > 1] == []
+
+
 def test_names_of_the_package_on_the_pages_resolve():
     wrong = []
     for path in [ROOT / "README.md", *PAGES]:
