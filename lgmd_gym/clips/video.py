@@ -128,7 +128,9 @@ def _rate(stamps: np.ndarray, tick: float, named: float) -> tuple[float, bool]:
     if not len(intervals):
         return round(named, 4), False
     median = intervals[(len(intervals) - 1) // 2]
-    regular = intervals[np.abs(intervals - median) <= max(1.0, _JITTER * median)]
+    # Stamps are rounded to ticks; where a tick is a frame, as in AVI, one tick more is a missing frame.
+    rounding = min(1.0, 0.5 * median)
+    regular = intervals[np.abs(intervals - median) <= max(rounding, _JITTER * median)]
     fps = len(regular) / (float(regular.sum()) * tick)
     # Stamps in whole milliseconds turn 30 Hz into 29.995 Hz in a short clip; the header is then more exact.
     return round(named if abs(fps - named) < 1e-3 * fps else fps, 4), len(regular) < len(intervals)

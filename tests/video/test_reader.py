@@ -117,6 +117,17 @@ def test_frames_keep_their_times_in_every_format(tmp_path, name, options):
         assert np.abs(luma(pictures[number]).astype(int) - luma(full[number])).mean() < 4.0
 
 
+def test_one_missing_frame_in_ticks_of_a_frame(tmp_path):
+    """AVI counts frames: an interval of two ticks is a missing frame, and not a lower frame rate."""
+    path = tmp_path / "gap.avi"
+    ffmpeg("-f", "lavfi", "-i", "testsrc2=size=64x48:rate=30:duration=1", "-vf", "select='not(eq(n,20))'",
+           "-fps_mode", "vfr", "-c:v", "ffv1", path)  # fmt: skip
+    info = probe(path)
+    assert (info.frames, info.fps, info.variable) == (29, 30.0, True)
+    assert (info.time_of(19), info.time_of(20), info.duration) == pytest.approx((19 / 30, 21 / 30, 1.0))
+    assert len(list(VideoReader(path))) == 30
+
+
 def test_frames_out_of_order_without_times_of_display(tmp_path):
     """AVI numbers the packets: with B frames, the picture before the gap may take the number after it."""
     path = tmp_path / "gap.avi"
