@@ -7,7 +7,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from highway_env.road.road import RoadNetwork
 
-from lgmd_gym.aliases import Info
+from lgmd_gym.aliases import Arguments, Info
 from lgmd_gym.camera.scene import WEATHERS, Scene
 from lgmd_gym.camera.worlds import LABORATORY, draw_world
 from lgmd_gym.envs.appearance import Appearance, brake_of
@@ -24,6 +24,10 @@ from lgmd_gym.envs.families.distribution import (
 from lgmd_gym.envs.families.scenario import Scenario, free_lane
 from lgmd_gym.envs.highway.network import road_network
 from lgmd_gym.envs.physics_state import Placement, place
+from lgmd_gym.errors import check_within
+
+MAX_PITCH_ERROR_DEG = 1.0
+MAX_HEIGHT_ERROR_M = 0.15
 
 
 class Draw(NamedTuple):
@@ -103,11 +107,13 @@ class RandomLevels:
             [m]; None for the height of each camera.
         decelerations: Lowest and highest full braking, drawn evenly for each level in place of that of its
             world, on dry and wet roads alike [m/s²]; None for that of the world.
+        sensor_errors: Share of the levels with errors that no calibration finds, in [0, 1]: every lens is
+            tilted by up to 1° and up to 0.15 m higher or lower, and half of these cars have no gyroscope.
 
     Raises:
         ValueError: If the split, a weather, the world or a family is unknown, levels are outside the
-            split, the heights or decelerations are not two numbers above 0 in ascending order, or a
-            deceleration is above 12 m/s².
+            split, the heights or decelerations are not two numbers above 0 in ascending order, a
+            deceleration is above 12 m/s², or the share is outside [0, 1].
     """
 
     def __init__(
@@ -121,6 +127,7 @@ class RandomLevels:
         families: Sequence[str] | None = None,
         mount_heights: Sequence[float] | None = None,
         decelerations: Sequence[float] | None = None,
+        sensor_errors: float = 0.0,
     ) -> None:
         start_level, num_levels = check_levels(split, start_level, num_levels, weathers)
         self.split, self.start_level, self.weathers = split, start_level, tuple(weathers)
@@ -133,6 +140,7 @@ class RandomLevels:
             self.decelerations = check_range("decelerations", decelerations, "m/s²")
             for limit in self.decelerations:
                 BrakeParams(max_deceleration=limit)  # raises an error if it is out of range
+        self.sensor_errors = check_within("sensor_errors", sensor_errors, 0.0, 1.0)
         self.appearance = Appearance(world=world, road=road, split=split)
         self.first = draw_scenario(level_generator(split, start_level), self.families)
 
@@ -152,9 +160,22 @@ class RandomLevels:
             texture=texture,
             queue_lane=free_lane(scenario),
             mount_height_m=height,
+            **self._sensor_errors(level),
         )
         info = {"level": level, "condition": weather, "world": scene.number}
         return Draw(placement, scene, info, self._brake(level, scene))
+
+    def _sensor_errors(self, level: int) -> Arguments:
+        """Return the fields of the scene with errors that no calibration finds."""
+        rng = level_generator(self.split, level, part=5)
+        share, pitch, height, gyroscope = rng.random(4)
+        if share >= self.sensor_errors:
+            return {}
+        return {
+            "pitch_error_deg": MAX_PITCH_ERROR_DEG * (2.0 * pitch - 1.0),
+            "height_error_m": MAX_HEIGHT_ERROR_M * (2.0 * height - 1.0),
+            "gyroscope": bool(gyroscope < 0.5),
+        }
 
     def _brake(self, level: int, scene: Scene) -> BrakeParams | None:
         """Return the brake of the level's world, with the deceleration of the level."""

@@ -40,6 +40,7 @@ LEVEL_ARGUMENTS = (
     "families",
     "mount_heights",
     "decelerations",
+    "sensor_errors",
 )
 """Arguments of `RandomLevels`."""
 APPEARANCE = ("world", "weather", "road", "scene")

@@ -2,11 +2,11 @@
 
     python docs/experiments/ablations.py stopping-zone --worlds 20 --jobs 2 --to docs/ablations.png
 
-Each arm plays the suites r152 (contacts avoided without premature braking) and false-reaction (false
-activations) in test worlds, in the condition and with the brake of each world. In r152 every case is played
-once in every world, in false-reaction in `--seeds` of them. Thresholds and weights of the agent are those of
-the complete sensor at 30 frames per second. The table has 95 % intervals that cluster by case and world, and
-is in Markdown.
+Each arm plays suites in test worlds, in the condition and with the brake of each world: r152 (contacts
+avoided without premature braking) and false-reaction (false activations), or `--suites`. In r152 every case
+is played once in every world, in the others in `--seeds` of them. Thresholds and weights of the agent are
+those of the complete sensor at 30 frames per second. The table has 95 % intervals that cluster by case and
+world, and is in Markdown.
 """
 
 import argparse
@@ -34,8 +34,13 @@ from lgmd_gym.plotting.style import COLOURS, saved_figure
 from lgmd_gym.statistics.intervals import Rate
 
 NO_VIEW = SensorConfig({"name": "wide", "shape": [8, 8]})  # no-brake needs no useful image
-SUITES = {"r152": "avoided", "false-reaction": "false_activation"}
-TITLES = {"r152": "r152: contacts avoided [%]", "false-reaction": "false-reaction: false activations [%]"}
+SUITES = ("r152", "false-reaction")
+NON_THREATS = ("false-reaction", "near-miss")  # suites whose score is the share of false activations
+
+
+def title_of(suite: str) -> str:
+    """Return the heading of the score of a suite."""
+    return f"{suite}: {'false activations' if suite in NON_THREATS else 'contacts avoided'} [%]"
 
 
 def halved(camera: Camera) -> Camera:
@@ -47,6 +52,13 @@ def halved(camera: Camera) -> Camera:
 def mounted(**fields: Any) -> Callable[[Camera], Camera]:
     """Return a change of a camera that replaces fields of its mount."""
     return lambda camera: replace(camera, mount=replace(camera.mount, **fields))
+
+
+def tilted(degrees: float) -> Callable[[Camera], Camera]:
+    """Return a change of a camera that tilts its mount upwards."""
+    return lambda camera: replace(
+        camera, mount=replace(camera.mount, pitch_deg=camera.mount.pitch_deg + degrees)
+    )
 
 
 def without_contrast_control(camera: Camera) -> Camera:
@@ -62,6 +74,8 @@ ARMS: dict[str, Callable[[Camera], Camera]] = {
     "half the pixels per row and column": halved,
     "camera 1.0 m high": mounted(height_m=1.0),
     "camera 1.5 m high": mounted(height_m=1.5),
+    "pitch +1°": tilted(1.0),
+    "pitch −1°": tilted(-1.0),
     "15 frames/s": replace,
     "60 frames/s": replace,
 }
@@ -99,8 +113,12 @@ def play(agent: str, arm: str, suite: str, worlds: range, seeds: int, jobs: int,
 
 def draw(file: Path, agent: str, rates: Mapping[str, Mapping[str, Rate]]) -> None:
     """Draw the rates of all arms with their intervals, one panel per suite."""
-    with saved_figure(file, 1, len(SUITES), sharey=True, figsize=(9.0, 3.0)) as (figure, panels):
-        for axes, suite in zip(panels, SUITES, strict=True):
+    suites = list(next(iter(rates.values())))
+    with saved_figure(file, 1, len(suites), sharey=True, figsize=(9.0, 3.0), squeeze=False) as (
+        figure,
+        panels,
+    ):
+        for axes, suite in zip(panels[0], suites, strict=True):
             values = [rates[arm][suite] for arm in rates]
             shares = np.array([100.0 * rate.k / rate.n for rate in values])
             limits = 100.0 * np.array([(rate.low, rate.high) for rate in values]).T
@@ -109,7 +127,7 @@ def draw(file: Path, agent: str, rates: Mapping[str, Mapping[str, Rate]]) -> Non
             errors = np.abs(limits - shares)
             axes.errorbar(shares, places, xerr=errors, fmt="none", ecolor=COLOURS[0], capsize=2)
             axes.set_yticks(places, list(rates))
-            axes.set(xlim=(0, 100), title=TITLES[suite])
+            axes.set(xlim=(0, 100), title=title_of(suite))
             axes.grid(axis="y", visible=False)
         figure.suptitle(f"{agent}: one property of the sensor changed at a time")
 
@@ -120,7 +138,8 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, dict[str, Rate]]:
     parser.add_argument("agent", nargs="?", default="stopping-zone")
     parser.add_argument("--arms", nargs="+", choices=ARMS, default=list(ARMS))
     parser.add_argument("--worlds", type=int, default=20)
-    parser.add_argument("--seeds", type=int, default=3, help="runs of each case of false-reaction")
+    parser.add_argument("--suites", nargs="+", default=SUITES)
+    parser.add_argument("--seeds", type=int, default=3, help="runs of each case of the suites but r152")
     parser.add_argument("--every", type=int, default=1, help="every n-th case of each suite only")
     parser.add_argument("--jobs", type=int, default=1, help="number of processes")
     parser.add_argument("--to", type=Path, help="picture to write")
@@ -129,10 +148,12 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, dict[str, Rate]]:
     if not 1 <= chosen.worlds <= len(test):
         parser.error(f"--worlds must be in [1, {len(test)}], the test worlds, got {chosen.worlds}")
     worlds = test[: chosen.worlds]
-    print(f"| {chosen.agent} | {' | '.join(TITLES.values())} |\n|---|---|---|")
+    print(f"| {' | '.join([chosen.agent, *map(title_of, chosen.suites)])} |")
+    print("|---" * (1 + len(chosen.suites)) + "|")
     for arm in chosen.arms:
         rates[arm] = {}
-        for suite, key in SUITES.items():
+        for suite in chosen.suites:
+            key = "false_activation" if suite in NON_THREATS else "avoided"
             seeds = chosen.worlds if suite == "r152" else min(chosen.seeds, chosen.worlds)
             rows = play(chosen.agent, arm, suite, worlds, seeds, chosen.jobs, chosen.every)
             rates[arm][suite] = rate_of(rows, key)

@@ -95,24 +95,26 @@ def mount_of(camera: Camera, scene: Scene, max_deceleration: float = USUAL_BRAKE
         scene: The scene.
         max_deceleration: Full braking of the car [m/s²].
     """
-    world, mount, sensor, stabilised = draw_world(scene.world), camera.mount, camera.sensor, camera.stabiliser
+    world, mount, sensor = draw_world(scene.world), camera.mount, camera.sensor
+    stabilised = camera.stabiliser is not None and scene.gyroscope
     left = CALIBRATED if mount.calibrated else 1.0
     # An error of the mount does not halve the height.
-    lens_height = max(mount.height_m + world.mount_height_error, 0.5 * mount.height_m)
+    height = max(mount.height_m + world.mount_height_error, 0.5 * mount.height_m)
+    lens_height = max(height + scene.height_error_m, 0.5 * mount.height_m)
     record = np.zeros((), MOUNT)
     record["setback"], record["left"], record["height"] = mount.setback_m, mount.left_m, lens_height
     record["yaw_deg"] = mount.yaw_deg + left * world.yaw_error_deg
-    record["pitch_deg"] = mount.pitch_deg + left * world.pitch_error_deg
+    record["pitch_deg"] = mount.pitch_deg + left * world.pitch_error_deg + scene.pitch_error_deg
     record["road"], record["shutter_s"] = ROADS[scene.road], sensor.shutter_s
     record["dive_deg"] = scene.dive_deg * (_GYRO_DIVE if stabilised else 1.0)
     record["focal"] = camera.focal_px
     record["centre_u"], record["centre_v"] = 0.5 * camera.shape[1], 0.5 * camera.shape[0]
     record["linear"], record["gaze"] = sensor.linear_light, GAZE_NUMBERS[camera.gaze.kind]
-    record["stabilised"], record["derotated"] = stabilised is not None, camera.gaze.derotated
+    record["stabilised"], record["derotated"] = stabilised, camera.gaze.derotated
     record["noisy"] = sensor.shot_noise > 0.0 or sensor.read_noise > 0.0
     record["box"], record["drawn"], record["seed"] = scene.vehicles == "box", world.drawn, scene.noise_seed
     if isinstance(camera.gaze, ToStoppingPoint):
-        known_height = lens_height - left * (lens_height - mount.height_m)
+        known_height = height - left * (height - mount.height_m)
         record["aim"] = _aim_of(camera, camera.gaze, scene, known_height, max_deceleration)
     return record
 

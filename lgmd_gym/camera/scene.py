@@ -161,6 +161,11 @@ class Scene(Record):
     mount_height_m: float | None = optional(
         number(None, "(0, 100]", "m", "Height of every lens above the ground; None for that of its mount.")
     )
+    pitch_error_deg: float = number(
+        0.0, "[-5, 5]", "degrees", "Upward tilt of every lens that no calibration finds."
+    )
+    height_error_m: float = number(0.0, "[-0.5, 0.5]", "m", "Height of every lens that no calibration finds.")
+    gyroscope: bool = flag(True, "Whether the car has the gyroscope that stabilises lenses.")
 
     @property
     def number(self) -> int:

@@ -185,6 +185,24 @@ def test_a_calibrated_lens_knows_most_of_its_mounting_errors():
         assert height == pytest.approx(HEIGHT + (1.0 - share) * world.mount_height_error)
 
 
+def test_no_calibration_finds_the_errors_of_the_scene():
+    """The lens is tilted and higher, and the sensor aims as without; the world has its own errors, too."""
+    world, errors = draw_world(12), {"pitch_error_deg": -0.8, "height_error_m": 0.12}
+    for calibrated, share in ((False, 1.0), (True, CALIBRATED)):
+        lens = lens_of(world=12, calibrated=calibrated, **errors)
+        assert math.degrees(lens.pitch) == pytest.approx(share * world.pitch_error_deg - 0.8)
+        assert lens.z == pytest.approx(HEIGHT + world.mount_height_error + 0.12)
+        p, plain = (rig(world=12, gaze="stopping", calibrated=calibrated, **e) for e in (errors, {}))
+        assert mount_of(*p)["aim"] == mount_of(*plain)["aim"]
+
+
+def test_a_car_without_a_gyroscope_stabilises_no_lens():
+    shared = {"road": "rough", "dive_deg": 0.1}
+    plain, without = lens_of(**shared), lens_of(**shared, stabiliser="gyroscope", gyroscope=False)
+    assert (plain.pitch, plain.roll, plain.yaw) == (without.pitch, without.roll, without.yaw)
+    assert lens_of(**shared, stabiliser="gyroscope").pitch != plain.pitch
+
+
 def test_at_night_the_headlights_are_those_of_the_car():
     """A box beside the path is as light in a frame that is aimed at it as in a frame straight ahead."""
     env = straight_env(speed=14.0, line_types=False)

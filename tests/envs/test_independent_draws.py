@@ -4,7 +4,7 @@ Draws that share a random stream are functions of one another, and a policy woul
 worlds are fixed, so that the tests themselves have no chance.
 """
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from itertools import combinations, product
 from types import SimpleNamespace
 
@@ -62,13 +62,15 @@ def binned(column):
 @pytest.fixture(scope="module")
 def levels():
     """Return the bins of what levels draw, with the fields of their worlds."""
-    source = RandomLevels(mount_heights=(1.0, 2.0), decelerations=(4.0, 10.0))
+    source = RandomLevels(mount_heights=(1.0, 2.0), decelerations=(4.0, 10.0), sensor_errors=1.0)
     rows = []
     for number in range(COUNT):
         placement, scene, _, brake = level(source, number)
         row = {"threat": placement.scenario.family in THREATS, "ego_speed": placement.scenario.ego_speed}
         row |= {"start": placement.start.x, "weather": scene.weather.name, "texture": scene.texture}
         row |= {"mount height": scene.mount_height_m, "drawn deceleration": brake.max_deceleration}
+        row |= {"pitch error": scene.pitch_error_deg, "height error": scene.height_error_m}
+        row |= {"gyroscope": scene.gyroscope}
         rows.append(row | fields_of_world(scene.world))
     return columns_of(rows)
 
@@ -96,11 +98,31 @@ def dependent(columns, pairs):
 def test_nothing_but_the_scenario_depends_on_the_level(levels):
     """Neither a field of the world nor another draw of the level predicts a threat, or one another."""
     of_level = ("threat", "ego_speed", "start", "weather", "texture", "mount height", "drawn deceleration")
+    of_level += ("pitch error", "height error", "gyroscope")
     of_world = {*levels} - {*of_level}
     assert {"yaw_error_deg", "sun_azimuth_deg", "exposure_s", "dead_time", "mixed weather"} <= of_world
     assert len(of_world) > 35
     pairs = [*product(of_level, of_world), *combinations(of_level, 2)]
     assert dependent(levels, pairs).keys() == {("threat", "ego_speed")}  # reversing and turning are slow
+
+
+def test_a_share_of_the_levels_has_errors_of_the_sensor():
+    """Errors of ±1° and ±0.15 m, drawn evenly; half of these cars have no gyroscope."""
+    with_errors, without = RandomLevels(sensor_errors=0.3), RandomLevels()
+    scenes = [level(with_errors, number).scene for number in range(800)]
+    changed = [scene for scene in scenes if scene.pitch_error_deg != 0.0]
+    assert len(changed) == pytest.approx(240, abs=4 * (800 * 0.3 * 0.7) ** 0.5)
+    tilts = np.array([scene.pitch_error_deg for scene in changed])
+    heights = np.array([scene.height_error_m for scene in changed])
+    for values, limit in ((tilts, 1.0), (heights, 0.15)):
+        assert 0.95 * limit < np.abs(values).max() < limit
+        assert abs(values.mean()) < 0.15 * limit
+    absent = sum(not scene.gyroscope for scene in scenes)
+    assert absent == sum(not scene.gyroscope for scene in changed)
+    assert absent == pytest.approx(len(changed) / 2, abs=2 * len(changed) ** 0.5)
+    for number, scene in enumerate(scenes[:50]):
+        clean = replace(scene, pitch_error_deg=0.0, height_error_m=0.0, gyroscope=True)
+        assert clean == level(without, number).scene
 
 
 def test_no_field_of_a_world_depends_on_another_one():
@@ -151,7 +173,7 @@ def test_every_random_stream_of_a_level_is_used_once(monkeypatch):
     _, scene, _, _ = level(source, 5)
     assert sorted(seed for seed in seeds if seed[:2] == (0, 5)) == [
         (0, 5),
-        *((0, 5, k) for k in (1, 2, 3, 4)),
+        *((0, 5, k) for k in (1, 2, 3, 4, 5)),
     ]
     seeds.clear()
     draw_world.__wrapped__(scene.world)
