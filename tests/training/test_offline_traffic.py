@@ -167,6 +167,15 @@ def test_contacts_that_no_braking_avoids_are_left_out():
     assert threat_episode(Standing(), 0, observations) is None
 
 
+@pytest.mark.parametrize(("contact", "threats"), [(30.0, 1), (30.0 + 1 / 30, 0), (None, 0)])
+def test_a_contact_after_the_end_of_the_drive_is_no_threat(monkeypatch, contact, threats):
+    observations = [{"ego_speed": np.zeros(1, np.float32)}] * 900
+    monkeypatch.setattr(traffic, "run_episode", lambda *_: (observations, Emergencies(contact, ())))
+    monkeypatch.setattr(traffic, "threat_episode", lambda *_: "threat")
+    (segments,) = TrafficRecorder("train", "fovea", ("inattentive-highway",)).record(range(1))
+    assert segments.count("threat") == threats
+
+
 def test_a_twin_that_does_not_repeat_the_contact_is_rejected():
     observations, _ = observations_of(Following())
     with pytest.raises(RuntimeError, match="does not repeat its contact at decision 137"):

@@ -86,7 +86,8 @@ class TrafficRecorder:
             non_threat_episode(stack(observations[first:last]), policy_hz)
             for first, last in segment_bounds(non_threat, policy_hz)
         ]
-        if erring and base.road.contact is not None and observations:
+        # a later contact is beyond the episode's end
+        if erring and observations and emergencies.contact == len(observations) / policy_hz:
             threat = threat_episode(make(camera=None), seed, observations)
             segments += [] if threat is None else [threat]
         return segments
