@@ -101,3 +101,13 @@ def test_output_in_any_encoding(encoding):
 def test_closed_streams(closed):
     command = f"{sys.executable} -m lgmd_gym list suites {closed}"
     assert subprocess.run(["sh", "-c", command], capture_output=True, timeout=60, check=False).returncode == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("closed", ["<&-", "2>&-", ">&- 2>&-"])
+def test_worker_processes_start_without_a_standard_stream(closed, tmp_path):
+    options = "--suite r152 --agents no-brake --seeds 1 --worlds 0 --jobs 2 --no-plots"
+    command = f"{sys.executable} -m lgmd_gym bench {options} --out {tmp_path / 'run'} {closed}"
+    done = subprocess.run(["sh", "-c", command], capture_output=True, timeout=300, check=False)
+    assert done.returncode == 0
+    assert (tmp_path / "run" / "summary.csv").exists()
