@@ -55,7 +55,7 @@ def test_complete_run_is_reported_without_its_agents(folder, tmp_path, capsys):
     assert (tmp_path / "loaded").exists()
     page = (folder / "report.html").read_text()
     assert "No camera frames" not in page
-    assert page.count('<figure><img src="data:image/png') >= 2
+    assert page.count('<figure><img src="data:image/jpeg') >= 2
 
 
 def test_incomplete_run_loads_its_agents_only_if_trusted(folder, tmp_path, capsys):
