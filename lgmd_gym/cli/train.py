@@ -99,7 +99,7 @@ def run(options: Train) -> int:
 def _what_is_kept(folder: Path) -> str:
     """Return what an interrupted training has saved, and how to go on."""
     resume = f"lgmd-gym train --resume {folder}"
-    if any(folder.glob("checkpoints/model_*_steps.zip")) or any(folder.glob("recordings/*/*")):
+    if any(folder.glob("checkpoints/model_*_steps.zip")) or any(folder.glob("episodes/*/*.npz")):
         return f"to resume: {resume}"
     return f"nothing was saved before the first checkpoint; to start again: {resume}"
 

@@ -9,6 +9,7 @@ from stable_baselines3.common.monitor import load_results
 from support.recordings import offline_config, write_yaml
 
 from lgmd_gym.agents import make_agent
+from lgmd_gym.cli import main as cli
 from lgmd_gym.training import TrainConfig, train
 from lgmd_gym.training.callbacks import MonitorLog
 from lgmd_gym.training.model_card import best_result, write_model_card
@@ -127,3 +128,24 @@ def test_model_card_without_an_evaluation(tmp_path):
     text = (tmp_path / "README.md").read_text()
     assert "model-index" not in text
     assert "The training had no evaluation." in text
+
+
+@pytest.mark.parametrize(
+    ("saved", "kept"),
+    [
+        ("checkpoints/model_64_steps.zip", "to resume"),
+        ("episodes/train/000000.npz", "to resume"),
+        ("episodes/train/000000.npz.part", "nothing was saved before the first checkpoint; to start again"),
+        ("config.json", "nothing was saved before the first checkpoint; to start again"),
+    ],
+)
+def test_an_interrupted_training_states_what_is_kept(saved, kept, tmp_path, monkeypatch, capsys):
+    def interrupted(config, folder, **options):
+        (folder / saved).parent.mkdir(parents=True)
+        (folder / saved).touch()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("lgmd_gym.training.train", interrupted)
+    assert cli.run(["train", "--out", str(tmp_path / "run")]) == 130
+    message = f"interrupted; {kept}: lgmd-gym train --resume {tmp_path / 'run'}\n"
+    assert capsys.readouterr().err.endswith(message)
