@@ -13,6 +13,7 @@ from lgmd_gym.benchmark.analysis.tables import limit_results, verdict_text
 from lgmd_gym.benchmark.case import Row, Suite
 from lgmd_gym.benchmark.summary import (
     INTERVAL_TEXT,
+    WORLDS,
     AgentSummary,
     Sample,
     by_condition,
@@ -20,6 +21,7 @@ from lgmd_gym.benchmark.summary import (
     without_fcw_driver,
 )
 from lgmd_gym.benchmark.task import NO_BRAKE
+from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.errors import counted
 from lgmd_gym.statistics.intervals import Rate
 
@@ -27,6 +29,8 @@ CAVEAT = (
     "These are results of one simulation with the cases of this suite. They are not a rating and do not show "
     "how a real car would perform."
 )
+PLACES = {LABORATORY: "In the laboratory:", WORLDS: "In worlds:"}
+"""Headings of the parts of `by_condition` that are no weather."""
 
 
 def conclusion(rows: list[Row], agents: list[str], suite: Suite) -> tuple[str, str, str]:
@@ -42,7 +46,8 @@ def conclusion(rows: list[Row], agents: list[str], suite: Suite) -> tuple[str, s
             (scores, _agent_sentences(part, braking)),
             (limits, _limit_sentences(part, braking, suite)),
         ):
-            sentences += ([f"Condition {condition}:"] if len(conditions) > 1 and found else []) + found
+            heading = PLACES.get(condition) or f"Condition {condition}:"
+            sentences += ([heading] if len(conditions) > 1 and found else []) + found
     sample, failed = [_sample_sentence(rows, suite)], sum(row["error"] is not None for row in rows)
     if failed:
         sample.append(f"{counted(failed, 'episode')} failed and {'is' if failed == 1 else 'are'} left out.")

@@ -131,6 +131,14 @@ def test_every_condition_has_its_sentences():
     assert "Condition" not in conclusion(run(2, 1), AGENTS, SUITE)
 
 
+def test_the_laboratory_and_worlds_are_no_conditions():
+    rows = [item | {"world": 8000} for item in run(2, 1)]
+    text = conclusion([*rows, *(item | {"world": None} for item in run(2, 1, contacts=2))], AGENTS, SUITE)
+    assert "In worlds: rule avoided 2 of 2" in text
+    assert "In the laboratory: rule avoided 0 of 2" in text
+    assert "Condition" not in text
+
+
 def test_episodes_with_an_fcw_driver_are_not_in_the_totals():
     rows = [*run(2, 1), row("rule", 7, fcw_driver=True, collision=True, avoided=False)]
     assert "rule avoided 2 of 2 threats" in conclusion(rows, AGENTS, SUITE)
