@@ -2,13 +2,24 @@
 
 from typing import NamedTuple
 
-from lgmd_gym.agents.zones import CONTRAST_S, NUM_FIELDS, SPAN_M, zone_cameras
+from lgmd_gym.agents.zones import (
+    CONTRAST_S,
+    DRY_DECELERATION,
+    LOW_ZONES,
+    REACHES,
+    REACTION,
+    SPAN_M,
+    zone_camera,
+)
 from lgmd_gym.aliases import Values
 
 # The forward fields are those of `stopping-zone` at twice the width: a pedestrian on collision course is
-# beside the ego's lane until the last second.
+# beside the ego's lane until the last second. One more zone, beyond them, is that of warnings.
 FORWARD_WIDTH_PX, FORWARD_SPAN_M, FORWARD_COLUMNS = 160, 2.0 * SPAN_M, 10
-NEURONS = ("lgmd", "dsn", "edges")
+FORWARD_REACHES = (*REACHES, 2.5)
+NUM_FORWARD_FIELDS = 2 * len(FORWARD_REACHES) + len(LOW_ZONES)
+FORWARD_NEURON = "dsn"
+NEURONS = ("dsn", "edges")  # at the sides
 SIDE_WIDTH_PX, SIDE_COLUMNS = 80, 5
 
 
@@ -31,17 +42,23 @@ SIDES = {
     "far": SidePair(43.0, 34.0, -1.9, 8),
 }
 NUM_SIDE_FIELDS = 2 * len(SIDES)  # per neuron
-NUM_MOTION_FIELDS = NUM_FIELDS + 2 * NUM_SIDE_FIELDS  # without the detectors of edges
-NUM_ALL_ROUND = NUM_FIELDS + NUM_SIDE_FIELDS * len(NEURONS)
-NUM_FORWARD_COLUMNS = NUM_FIELDS * FORWARD_COLUMNS
+NUM_ALL_ROUND = NUM_FORWARD_FIELDS + NUM_SIDE_FIELDS * len(NEURONS)
+NUM_FORWARD_COLUMNS = NUM_FORWARD_FIELDS * FORWARD_COLUMNS
 NUM_COLUMNS = NUM_FORWARD_COLUMNS + NUM_SIDE_FIELDS * len(NEURONS) * SIDE_COLUMNS
 
 
 def forward_cameras() -> list[Values]:
-    """Return the channels of `stopping-zone` at twice the width, with ten columns of 0.48 m at the far end.
+    """Return the channels of the path: eight ground fields, eight upright fields, three low fields.
 
-    Their stopping distance follows the car's estimate of its full braking.
+    They are those of `stopping-zone` with one more zone, at twice the width, with ten columns of 0.48 m at
+    the far end. Their stopping distance follows the car's estimate of its full braking.
     """
+    zones = {"ground": FORWARD_REACHES, "upright": FORWARD_REACHES, "low": [REACHES[k] for k in LOW_ZONES]}
+    cameras = [
+        zone_camera(kind, reach, DRY_DECELERATION, REACTION)
+        for kind, reaches in zones.items()
+        for reach in reaches
+    ]
     return [
         {
             "camera": camera
@@ -49,10 +66,10 @@ def forward_cameras() -> list[Values]:
                 "shape": [camera["shape"][0], FORWARD_WIDTH_PX],
                 "gaze": camera["gaze"] | {"span_m": FORWARD_SPAN_M, "brake_known": True},
             },
-            "neuron": "lgmd",
+            "neuron": FORWARD_NEURON,
             "columns": FORWARD_COLUMNS,
         }
-        for camera in zone_cameras()
+        for camera in cameras
     ]
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from lgmd_gym.agents.base import FPS, Observations
 from lgmd_gym.agents.rules import excitation
-from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS, NUM_MOTION_FIELDS
+from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS, NUM_FORWARD_FIELDS, NUM_SIDE_FIELDS
 from lgmd_gym.agents.zones import NUM_FIELDS
 from lgmd_gym.aliases import Values
 from lgmd_gym.errors import check_items, check_known, shown
@@ -50,8 +50,7 @@ ZONE_INPUTS = {
     "zones": FieldInput("membrane_potential", 2.0),  # as excitation k/(n σ3), at most 15
     "zones_spikes": FieldInput("spike_frequency", 0.1),  # [spikes/s]; ten spikes per frame at 30 Hz are 300
     "zones_ffi": FieldInput("ffi", 2.0),  # [grey levels]
-    "sides": FieldInput("membrane_potential", 2.0, NUM_FIELDS, NUM_MOTION_FIELDS),  # LGMD and DSN
-    "sides_ffi": FieldInput("ffi", 2.0, NUM_FIELDS, NUM_MOTION_FIELDS),
+    "sides_ffi": FieldInput("ffi", 2.0, NUM_FORWARD_FIELDS, NUM_FORWARD_FIELDS + NUM_SIDE_FIELDS),  # DSN
     "columns": FieldInput("column_potential", 2.0, 0, NUM_COLUMNS),
 }
 
@@ -104,7 +103,7 @@ class FeatureConfig(Record):
         "Observation keys, among them `frame` and `known_deceleration`, and inputs derived from them: "
         "`speed_change`, the change since the last decision; `spike_peak`, the decaying peak of the spike "
         "frequency; with the cameras of `stopping-zone`, `zones`, `zones_spikes` and `zones_ffi`; and with "
-        "those of `all-round` also `sides`, `sides_ffi` and `columns` (see `FeatureHistory`)",
+        "those of `all-round` `sides_ffi` and `columns` (see `FeatureHistory`)",
     )
     history: int = whole(
         6,
@@ -133,10 +132,8 @@ class FeatureConfig(Record):
     @property
     def cameras_of(self) -> str | None:
         """Agent whose cameras the inputs require: "stopping-zone" or "all-round"; None for any cameras."""
-        required = [ZONE_INPUTS[name].last for name in self.inputs if name in ZONE_INPUTS]
-        if not required:
-            return None
-        return "stopping-zone" if max(required) == NUM_FIELDS else "all-round"
+        required = {_cameras_for(name)[0] for name in self.inputs if name in ZONE_INPUTS}
+        return max(required, default=None)
 
     def latches(self, demands: Any) -> Any:
         """Return whether demands in [-1, 1] are held until the episode ends, bool, shape (N,)."""
@@ -356,17 +353,21 @@ def weaker(level: np.ndarray, last: np.ndarray) -> np.ndarray:
 
 def check_zone_shape(name: str, shape: tuple[int, ...]) -> None:
     """Raise ValueError unless an observation comes from the cameras that an input requires."""
-    if ZONE_INPUTS[name].source == "column_potential":
-        agent, allowed, kind = "all-round", (NUM_COLUMNS,), "columns"
-    elif ZONE_INPUTS[name].last == NUM_FIELDS:
-        agent, allowed, kind = "stopping-zone", (NUM_FIELDS, NUM_ALL_ROUND), "cameras"
-    else:
-        agent, allowed, kind = "all-round", (NUM_ALL_ROUND,), "cameras"
-    if shape not in [(count,) for count in allowed]:
+    agent, count, kind = _cameras_for(name)
+    if shape != (count,):
         raise ValueError(
-            f"policy input {name!r} requires the {allowed[0]} {kind} of {agent}, got {shape[0]}; "
+            f"policy input {name!r} requires the {count} {kind} of {agent}, got {shape[0]}; "
             f"train with --sensors-of {agent}"
         )
+
+
+def _cameras_for(name: str) -> tuple[str, int, str]:
+    """Return the agent whose cameras an input requires, and the number of its values."""
+    if name == "columns":
+        return "all-round", NUM_COLUMNS, "columns"
+    if name == "sides_ffi":
+        return "all-round", NUM_ALL_ROUND, "cameras"
+    return "stopping-zone", NUM_FIELDS, "cameras"
 
 
 @cache

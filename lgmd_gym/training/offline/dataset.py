@@ -25,19 +25,18 @@ from lgmd_gym.agents.policies.features import (
 )
 from lgmd_gym.agents.sides import (
     FORWARD_COLUMNS,
+    FORWARD_NEURON,
     NEURONS,
     NUM_FORWARD_COLUMNS,
-    NUM_MOTION_FIELDS,
     NUM_SIDE_FIELDS,
     SIDE_COLUMNS,
 )
-from lgmd_gym.agents.zones import NUM_FIELDS
 from lgmd_gym.training.offline.episodes import Observation, RecordedEpisode
 
 EPISODES_AT_ONCE = 16  # whose inputs are computed together
 EVEN = ("ego_speed", "ego_acceleration", "known_deceleration", "zones", "zones_spikes", "zones_ffi")
 """Inputs that the mirror image does not change."""
-EXCHANGED = ("columns", "sides", "sides_ffi")
+EXCHANGED = ("columns", "sides_ffi")
 """Inputs of which the mirror image exchanges left and right."""
 
 
@@ -227,18 +226,17 @@ def mirror_of(name: str, size: int) -> Mirror:
     if name == "ego_yaw_rate":
         return Mirror(np.arange(size), np.full(size, -1.0, np.float32))
     check_mirror([name])
-    single = _columns() if name == "columns" else _fields(signed=name == "sides")
+    single = _columns() if name == "columns" else _fields()
     count = len(single.order)
     assert size == NUM_LEVELS * count == ZONE_INPUTS[name].size
     order = (np.arange(NUM_LEVELS)[:, None] * count + single.order).ravel()
     return Mirror(order, np.tile(single.signs, NUM_LEVELS))
 
 
-def _fields(signed: bool) -> Mirror:
-    """Return the mirror image of one value per LGMD and DSN at the sides: left and right exchanged."""
-    pairs = np.arange(NUM_MOTION_FIELDS - NUM_FIELDS).reshape(-1, 2)
-    direction = [1.0, -1.0 if signed else 1.0]
-    return Mirror(pairs[:, ::-1].ravel(), np.repeat(direction, NUM_SIDE_FIELDS).astype(np.float32))
+def _fields() -> Mirror:
+    """Return the mirror image of one strength per DSN at the sides: left and right exchanged."""
+    pairs = np.arange(NUM_SIDE_FIELDS).reshape(-1, 2)
+    return Mirror(pairs[:, ::-1].ravel(), np.ones(NUM_SIDE_FIELDS, np.float32))
 
 
 def _columns() -> Mirror:
@@ -246,6 +244,7 @@ def _columns() -> Mirror:
     forward = np.arange(NUM_FORWARD_COLUMNS).reshape(-1, FORWARD_COLUMNS)[:, ::-1].ravel()
     count = NUM_SIDE_FIELDS * len(NEURONS) * SIDE_COLUMNS
     sides = NUM_FORWARD_COLUMNS + np.arange(count).reshape(-1, 2, SIDE_COLUMNS)[:, ::-1, ::-1].ravel()
-    direction = np.repeat([-1.0 if name == "dsn" else 1.0 for name in NEURONS], count // len(NEURONS))
-    signs = np.concatenate([np.ones(NUM_FORWARD_COLUMNS), direction]).astype(np.float32)
-    return Mirror(np.concatenate([forward, sides]), signs)
+    signs = {neuron: -1.0 if neuron == "dsn" else 1.0 for neuron in (FORWARD_NEURON, *NEURONS)}
+    parts = [np.full(NUM_FORWARD_COLUMNS, signs[FORWARD_NEURON])]
+    parts += [np.full(count // len(NEURONS), signs[neuron]) for neuron in NEURONS]
+    return Mirror(np.concatenate([forward, sides]), np.concatenate(parts).astype(np.float32))
