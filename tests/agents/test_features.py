@@ -17,6 +17,7 @@ from lgmd_gym.agents.sides import (
     NUM_ALL_ROUND,
     NUM_COLUMNS,
     NUM_FORWARD_COLUMNS,
+    NUM_FORWARD_FIELDS,
     NUM_SIDE_FIELDS,
     all_round_cameras,
 )
@@ -117,13 +118,6 @@ def test_averages_approach_the_level_with_their_time_constants():
     assert np.all(zone_features(history, np.zeros(NUM_FIELDS)) == 0.0)
 
 
-def observe_sides(responses):
-    """Return an observation of the cameras of `all-round`: responses of those at the sides, shape (18,)."""
-    responses = np.concatenate([np.full(NUM_FIELDS, 5.0), responses])
-    potential = (1.0 / (1.0 + np.exp(-responses))).astype(np.float32)
-    return {"membrane_potential": potential, "ffi": np.abs(responses)}
-
-
 def test_features_of_columns_have_the_sign_of_the_motion():
     responses = np.linspace(-6.0, 5.0, NUM_COLUMNS)
     observation = {"column_potential": (1.0 / (1.0 + np.exp(-responses))).astype(np.float32)}
@@ -134,33 +128,26 @@ def test_features_of_columns_have_the_sign_of_the_motion():
 
 
 def test_features_of_mean_strengths_at_the_sides():
-    strengths = np.linspace(0.0, 9.0, NUM_ALL_ROUND - NUM_FIELDS)
-    features = stack(zone_history("sides_ffi"), observe_sides(strengths))["sides_ffi"].reshape(4, -1)
-    expected = np.log1p(2.0 * strengths[: 2 * NUM_SIDE_FIELDS]) / 3.4
+    strengths = np.linspace(0.0, 9.0, NUM_ALL_ROUND)
+    features = stack(zone_history("sides_ffi"), {"ffi": strengths})["sides_ffi"].reshape(4, -1)
+    expected = np.log1p(2.0 * strengths[19:25]) / 3.4  # after those of 8 + 8 + 3 forward fields
     assert features[0] == pytest.approx(expected, abs=1e-5)
-
-
-def test_zone_features_of_all_round_cameras_are_those_of_stopping_zone():
-    history, levels = zone_history(), zone_levels(ground=7.0, upright=1.0)
-    alone = stack(history, observe_zones(levels))["zones"]
-    history.reset()
-    observation = observe_sides(np.zeros(NUM_ALL_ROUND - NUM_FIELDS))
-    observation["membrane_potential"][:NUM_FIELDS] = to_potential(levels)
-    assert stack(history, observation)["zones"] == pytest.approx(alone, abs=1e-6)
 
 
 def test_cameras_of_all_round_are_in_the_order_of_the_features():
     channels = make_channels(all_round_cameras())
     names = [channel.name for channel in channels]
     assert len(set(names)) == NUM_ALL_ROUND
-    assert names[NUM_FIELDS : NUM_FIELDS + 3] == ["near_left_lgmd", "near_right_lgmd", "middle_left_lgmd"]
-    sides = channels[NUM_FIELDS:]
+    assert names[7:9] == ["ground2.5", "upright0.28"]
+    assert {channel.neuron for channel in channels[:NUM_FORWARD_FIELDS]} == {"dsn"}
+    assert names[19:22] == ["near_left_dsn", "near_right_dsn", "middle_left_dsn"]
+    sides = channels[NUM_FORWARD_FIELDS:]
     for first, others in ((sides[k], sides[k::NUM_SIDE_FIELDS]) for k in range(NUM_SIDE_FIELDS)):
-        assert [channel.neuron for channel in others] == ["lgmd", "dsn", "edges"]
+        assert [channel.neuron for channel in others] == ["dsn", "edges"]
         assert all((channel.camera, channel.columns) == (first.camera, first.columns) for channel in others)
     columns = [channel.columns for channel in channels]
-    assert sum(columns[:NUM_FIELDS]) == NUM_FORWARD_COLUMNS
-    assert sum(columns) == NUM_COLUMNS
+    assert sum(columns[:NUM_FORWARD_FIELDS]) == NUM_FORWARD_COLUMNS == 190
+    assert sum(columns) == NUM_COLUMNS == 250
     assert ZONE_INPUTS["columns"].size == 4 * NUM_COLUMNS
 
 
@@ -168,7 +155,7 @@ def test_missing_or_other_observations_are_rejected():
     two_cameras = observe(1.0) | {"membrane_potential": np.array([0.5, 0.6]), "ego_yaw_rate": np.zeros(1)}
     with pytest.raises(ValueError, match="requires the 17 cameras of stopping-zone, got 2; train with"):
         update(zone_history(), two_cameras)
-    with pytest.raises(ValueError, match="'sides_ffi' requires the 35 cameras of all-round, got 17; train"):
+    with pytest.raises(ValueError, match="'sides_ffi' requires the 31 cameras of all-round, got 17; train"):
         update(zone_history("sides_ffi"), observe_zones(zone_levels()))
     with pytest.raises(ValueError, match="requires the observation 'ffi', got"):
         update(FeatureHistory(FeatureConfig(inputs=("ffi",))), observe(1.0))
@@ -210,5 +197,5 @@ def test_blocks_larger_than_the_frame_are_rejected():
 
 def test_columns_require_the_cameras_of_all_round():
     features = FeatureConfig(inputs=("columns",), history=1)
-    with pytest.raises(ValueError, match="requires the 260 columns of all-round, got 0; train with"):
+    with pytest.raises(ValueError, match="requires the 250 columns of all-round, got 0; train with"):
         features.box_arguments({"membrane_potential": (17,)})

@@ -21,7 +21,7 @@ def test_fields_end_just_below_the_horizon(channel):
 
 def test_fields_cover_both_sides_without_a_gap():
     for sign in (-1.0, 1.0):
-        cameras = [item.camera for item in make_channels(side_cameras()) if item.neuron == "lgmd"]
+        cameras = [item.camera for item in make_channels(side_cameras()) if item.neuron == "dsn"]
         fields = [(camera.mount.yaw_deg, camera.hfov_deg) for camera in cameras]
         spans = sorted(
             (sign * yaw_deg - hfov_deg / 2, sign * yaw_deg + hfov_deg / 2)
