@@ -24,7 +24,6 @@ from statistics import median
 from typing import Any, NamedTuple
 
 import numpy as np
-from all_scores import check_agents
 from joblib import Parallel, delayed
 
 from lgmd_gym.agents import HOLD, make_agent
@@ -36,6 +35,7 @@ from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.traffic.replay import EVENT_PAUSE
 from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.envs.registration import TRAFFIC_KINDS
+from lgmd_gym.errors import check_known
 from lgmd_gym.rendering.playback import make_target
 
 SITUATIONS = ("car ahead", "crossing", "oncoming", "other", "none")
@@ -132,7 +132,7 @@ def play(run: StoredRun, agent: str, jobs: int) -> list[tuple[str, Onset]]:
     """
     if not is_traffic(run.config.suite):
         raise ValueError(f"the run is one of {run.config.suite}; pass one of lgmd-gym bench --suite traffic")
-    check_agents([agent], run)
+    check_known("agent of the run", agent, run.config.agents)
     rows = [row for row in run.rows if row["agent"] == agent and row["error"] is None]
     only_false = [row for row in rows if 0 < row["brakes"] == row["false_activations"]]
     if not only_false:

@@ -120,55 +120,6 @@ def test_deviations(capsys):
     assert literal.peak > effects["spikes from K (eq. 11)"].peak > default.peak
 
 
-def test_all_scores():
-    """One column per run; cases with an FCW driver are left out."""
-    config = RunConfig(suite="r152", agents=("no-brake", "a"), seeds=1)
-    values = {"avoided": True, "premature_brake": False, "speed_reduction": 5.0, "fcw_driver": False}
-    rows = [
-        threat_row(case=f"r152/CCRs/v{speed}", world=world, **values)
-        for speed, world in ((20, 8000), (40, 8001))
-    ]
-    rows.append(rows[0] | {"fcw_driver": True, "avoided": False, "seed": 1})
-    false = [row | {"threat": False, "false_activation": row["world"] == 8000} for row in rows[:2]]
-    quiet = RunConfig(suite="false-reaction", agents=("a",), seeds=1, worlds=0)
-    drive = {"distance": 5e4, "false_activations": 1, "moving_time": 9.0, "needed_time": 0.0}
-    drive |= {"scaled_needed_time": 0.0, "needless_activations": 1, "speed_lost": 9.0, "avoidable": None}
-    drive |= {
-        "avoided_by_brake": None,
-        "caused": False,
-        "side": "",
-        "alerts": 1,
-        "brakes": 1,
-        "collision": False,
-        "peak_deceleration": 9.0,
-    }
-    traffic = RunConfig(suite="traffic", agents=("a",), seeds=1, conditions=("mixed",))
-    runs = [StoredRun(config, rows, False), StoredRun(quiet, false, False)]
-    runs.append(StoredRun(traffic, [rows[0] | drive | {"threat": False}], False))
-    example = load("all_scores")
-    heading, _, none, a = example.table([example.column(run) for run in runs])
-    assert "r152: avoided, 2 cases in 2 worlds, clear" in heading
-    assert "false-reaction: false activations, 2 cases in the laboratory, clear" in heading
-    assert "traffic: false activations per 100 km, 1 case in 1 world, mixed" in heading
-    assert a.startswith("| a | 2/2 [")
-    assert "| 1/2 [" in a
-    assert "| 2.0 [" in a
-    assert none == "| no-brake | – | – | – |"
-
-
-def test_scores_by_family():
-    config = RunConfig(suite="r152", agents=("no-brake", "a"), seeds=1)
-    values = {"premature_brake": False, "speed_reduction": 5.0, "fcw_driver": False}
-    cases = (("CCRs/v20", True), ("CCRs/v40", False), ("CCRm/v30", True))
-    rows = [threat_row(case=f"r152/{case}", avoided=avoided, **values) for case, avoided in cases]
-    script, run = load("all_scores"), StoredRun(config, rows, False)
-    _, _, slower, standing = script.family_table(["a"], [run])
-    assert slower.startswith("| r152 | CCRm | 1/1 [")
-    assert standing.startswith("| r152 | CCRs | 1/2 [")
-    with pytest.raises(ValueError, match="the run of r152 has no agent 'b'; it has no-brake, a"):
-        script.family_table(["b"], [run])
-
-
 def test_real_cars():
     """A line per agent and run; premature braking and contact are failures."""
     cases = ("CCRs/v10", "CCRs/v80", "CCRm/v70", "CCRm/v60", "CCRb/v80/brake0.5g-gap12")
@@ -179,30 +130,6 @@ def test_real_cars():
     config = RunConfig(suite="fmvss127", agents=("a",), seeds=2)
     *_, line = load("real_cars").table([StoredRun(config, rows, False)])
     assert line == "| `a`, worlds | 1/3 (10 km/h) | 1/1 | 0/0 | 1/1 |"
-
-
-def test_detections():
-    config = RunConfig(suite="ncap2023", agents=("no-brake", "a"), seeds=1)
-    values = {"premature_brake": False, "speed_reduction": 5.0, "fcw_driver": False}
-    runs = []
-    for suite in ("ncap2023", "ncap2023-without-target"):
-        avoided = {"CCRs/v20": True, "CCRs/v40": False, "CCCscp/v20/target20": True}
-        rows = [threat_row(case=f"{suite}/{case}", avoided=avoided[case], **values) for case in avoided]
-        runs.append(StoredRun(replace(config, suite=suite), rows, False))
-    for row in runs[1].rows:
-        row["false_activation"] = "CCCscp" in row["case"]
-    runs[0].rows.append(threat_row("no-brake", f"{config.suite}/CCRs/v20", avoided=False, **values))
-    script = load("detections")
-    crossing, standing, together = script.lines(["a"], *runs)
-    assert (crossing[1], standing[1], together[1]) == ("CCCscp", "CCRs", "all")
-    assert crossing[2].startswith("0/1 [")
-    assert crossing[2].endswith("] (1)")
-    assert standing[2].startswith("1/2 [")
-    assert standing[2].endswith("] (1)")
-    assert together[2].startswith("1/3 [")
-    assert together[2].endswith("] (2)")
-    with pytest.raises(ValueError, match="the run of ncap2023 has no agent 'b'; it has no-brake, a"):
-        script.lines(["b"], *runs)
 
 
 @pytest.mark.slow
@@ -249,27 +176,6 @@ def test_learning_curves(capsys, tmp_path):
         "dqn1: best return -0.50 at 100 decisions, n = 2",
     ]
     assert (tmp_path / "curves.png").stat().st_size > 5_000
-
-
-def test_leaderboard_prints_a_row_per_agent(monkeypatch, tmp_path, capsys):
-    """A run that exists is not repeated."""
-    example = load("leaderboard")
-    suite = tmp_path / "mine.toml"
-    suite.write_text('name = "mine"\n[[cases]]\nfamily = "CCRs"\nspeeds_kmh = [20]\n')
-    monkeypatch.setitem(example.RUNS, "levels", {"suite": str(suite), "seeds": 1, "worlds": 0})
-    for _ in range(2):
-        example.main(["ttc-oracle"], tmp_path / "board", ["levels"])
-        lines = capsys.readouterr().out.splitlines()[-3:]
-        heading = "mine: avoided, 1 case in the laboratory, clear | levels: false activations"
-        assert lines[0] == f"| agent | {heading} |"
-        assert lines[2].startswith("| ttc-oracle | 1/1 ")
-    assert [path.name for path in (tmp_path / "board").iterdir()] == ["levels"]
-    with pytest.raises(ValueError, match="levels' has ttc-oracle, not no-brake; choose another --out"):
-        example.main(["no-brake"], tmp_path / "board", ["levels"])
-    rows = tmp_path / "board" / "levels" / "episodes.jsonl"
-    rows.write_text("".join(rows.read_text().splitlines(keepends=True)[:1]))
-    with pytest.raises(ValueError, match="lacks 1 episode; complete it with lgmd-gym bench --resume"):
-        example.main(["ttc-oracle"], tmp_path / "board", ["levels"])
 
 
 def test_levels_of_the_leaderboard():

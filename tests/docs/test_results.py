@@ -1,0 +1,121 @@
+"""The script that plays the suites of the documentation, and the tables of the pages that it fills."""
+
+import pytest
+from support.examples import load
+from support.rows import threat_row
+
+from lgmd_gym.benchmark import RunConfig
+from lgmd_gym.benchmark.run_folder import StoredRun
+
+USUAL = {"premature_brake": False, "speed_reduction": 5.0, "fcw_driver": False}
+
+
+@pytest.fixture(scope="module")
+def script():
+    return load("results")
+
+
+def stored(suite, cases, twin=()):
+    """Return a run with one row per case: whether it is avoided; those of `twin` are false activations."""
+    config = RunConfig(suite=suite, agents=("a",), seeds=1)
+    rows = [threat_row("a", f"{suite}/{case}", avoided=avoided, **USUAL) for case, avoided in cases.items()]
+    for row in rows:
+        row["false_activation"] = any(name in row["case"] for name in twin)
+    return StoredRun(config, rows, False)
+
+
+def found(script, runs):
+    return {score[:4]: (score.rate.k, score.rate.n) for score in script.scores_of(runs)}
+
+
+def test_scores_by_family_with_those_that_are_due_to_the_target(script):
+    cases = {"CCRs/v20": True, "CCRs/v40": False, "CCCscp/v20/target20": True}
+    run = stored("ncap2023", cases)
+    run.rows.append(threat_row("a", "ncap2023/CCRs/v50", avoided=True, **USUAL | {"fcw_driver": True}))
+    twin = stored("ncap2023-without-target", cases, ["CCCscp"])
+    for row in twin.rows:
+        row["threat"] = False
+    assert found(script, {"ncap2023": run, "ncap2023-without-target": twin}) == {
+        ("ncap2023", "all", "a", "avoided"): (2, 3),
+        ("ncap2023", "all", "a", "warned"): (1, 1),
+        ("ncap2023", "all", "a", "detected"): (1, 3),
+        ("ncap2023", "CCRs", "a", "avoided"): (1, 2),
+        ("ncap2023", "CCRs", "a", "warned"): (1, 1),
+        ("ncap2023", "CCRs", "a", "detected"): (1, 2),
+        ("ncap2023", "CCCscp", "a", "avoided"): (1, 1),
+        ("ncap2023", "CCCscp", "a", "detected"): (0, 1),
+        ("ncap2023-without-target", "all", "a", "false"): (1, 3),
+        ("ncap2023-without-target", "CCRs", "a", "false"): (0, 2),
+        ("ncap2023-without-target", "CCCscp", "a", "false"): (1, 1),
+    }
+
+
+def test_scores_of_the_regulation_are_stated_per_case(script):
+    scores = found(script, {"r152": stored("r152", {"CCRs/v20": True, "CCRs/v40": False})})
+    assert scores["r152", "CCRs/v20", "a", "avoided"] == (1, 1)
+    assert scores["r152", "CCRs/v40", "a", "avoided"] == (0, 1)
+
+
+def test_pages_have_the_scores_of_the_files(script):
+    """All tables on the pages are filled from the files."""
+    assert script.fill_pages(check=True) == []
+
+
+def test_blocks_are_filled_and_the_rest_of_a_page_stays(script):
+    rate = script.Rate(1, 2, 0.05, 0.95)
+    scores = [script.Score("r152", group, "a", "avoided", rate) for group in ("all", "CCRs/v20")]
+    drives = [script.Drives("traffic", "a", 200.0, 4, 5.5, 51.2, 30.0, 4, 3, 2, 1)]
+
+    def make(kind, arguments):
+        return script.table(kind, arguments, scores, drives)
+
+    text = "one\n<!-- table: {} -->\nold\n<!-- end of table -->\ntwo\n"
+    page = script.filled(text.format("avoided r152 : a"), make)
+    assert page.splitlines()[1:6] == [
+        "<!-- table: avoided r152 : a -->",
+        "",
+        "| agent | r152 |",
+        "| --- | --- |",
+        "| `a` | 1/2 [5–95] |",
+    ]
+    assert page.startswith("one\n")
+    assert page.endswith("<!-- end of table -->\ntwo\n")
+    assert script.filled(page, make) == page
+    assert "| CCRs/v20 | 1/2 [5–95] |" in script.filled(text.format("cases r152"), make)
+    line = script.filled(text.format("traffic"), make).splitlines()[5]
+    assert line == "| traffic | `a` | 200 | 20 [6–51] | 15 | 3/4 | 2 | 1 |"
+    with pytest.raises(ValueError, match="unknown kind of table 'avoid'; did you mean 'avoided'"):
+        script.filled(text.format("avoid r152"), make)
+    with pytest.raises(ValueError, match="unknown agent of the results 'b'"):
+        script.filled(text.format("avoided r152 : b"), make)
+
+
+def test_files_keep_the_scores(script, tmp_path, monkeypatch):
+    monkeypatch.setattr(script, "SCORES", tmp_path / "results" / "scores.csv")
+    monkeypatch.setattr(script, "TRAFFIC", tmp_path / "results" / "traffic.csv")
+    scores = [script.Score("r152", "all", "b:x=1,y=2", "avoided", script.Rate(1, 3, 0.061, 0.792))]
+    drives = [script.Drives("traffic", "a", 200.5, 4, 5.5, 51.2, 30.0, 4, 3, 2, 1)]
+    script.write_scores(scores, "abc123")
+    script.write_traffic(drives, "abc123")
+    assert (script.read_scores(), script.read_traffic()) == (scores, drives)
+    assert "commit abc123" in script.SCORES.read_text()
+
+
+def test_own_agents_are_played_and_printed(script, tmp_path, monkeypatch, capsys):
+    """A suite whose folder exists is not played again; an incomplete one is refused."""
+    suite = tmp_path / "mine.toml"
+    suite.write_text('name = "mine"\n[[cases]]\nfamily = "CCRs"\nspeeds_kmh = [20]\n')
+    monkeypatch.setattr(script, "SEEDS", {"mine": 1})
+    config = RunConfig(suite=str(suite), agents=("ttc-oracle",), seeds=1, worlds=0)
+    monkeypatch.setattr(script, "config_of", lambda name, agents: config)
+    for _ in range(2):
+        script.play(tmp_path / "runs", ["ttc-oracle"], ["mine"])
+    monkeypatch.setattr("sys.argv", ["results.py", "collect", str(tmp_path / "runs"), "--print"])
+    script.main()
+    assert "| `ttc-oracle` | 1/1 [21–100] |" in capsys.readouterr().out
+    rows = (tmp_path / "runs" / "mine" / "episodes.jsonl").read_text()
+    (tmp_path / "runs" / "mine" / "episodes.jsonl").write_text(rows[: rows.index("\n") - 5])
+    with pytest.raises(ValueError, match="lacks 2 episodes; complete it with lgmd-gym bench --resume"):
+        script.read(tmp_path / "runs")
+    with pytest.raises(ValueError, match=r"no runs in .*; play them first with results.py run"):
+        script.read(tmp_path)
