@@ -235,6 +235,11 @@ class TimeToBrakeLearner:
         )
 
     @torch.no_grad()
+    def odds(self, dataset: StateDataset) -> np.ndarray:
+        """Return the log odds of the trained model at all decisions, see `TimeToBrakeParams.odds`."""
+        return self.brake.odds(_forward(self.model.policy, dataset.batch(np.arange(len(dataset)))).numpy())
+
+    @torch.no_grad()
     def _logits(self, features: torch.Tensor) -> np.ndarray:
         """Return the mean logits of standardised features, float32, (M, actions)."""
         return torch.stack([_forward(network, features) for network in self.networks]).mean(0).numpy()
