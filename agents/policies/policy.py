@@ -110,9 +110,8 @@ class Policy(StagedAgent):
     Args:
         path: Zip file, or name of a policy in this package.
         margin: Log odds of braking above which the policy brakes, in [-20, 20]; not 0 only for a policy that
-            chooses one of two demands by their probabilities, such as those of `--algo offline`, or whose
-            brake has stages. Above 0, the policy warns and brakes later and less often: it has fewer false
-            activations and avoids fewer contacts.
+            chooses one of two demands by their probabilities, or whose brake has stages. Above 0, the policy
+            warns and brakes later and less often: it has fewer false activations and avoids fewer contacts.
 
     Attributes:
         card: The card.

@@ -21,7 +21,7 @@ import torch
 
 from lgmd_gym.neuron import LGMD, LGMDParams
 from lgmd_gym.neuron.lgmd_torch import LayerResponse, LGMDLayer, Softness
-from lgmd_gym.training.offline.recorder import LevelRecorder
+from lgmd_gym.training.offline.driving import DriveRecorder
 
 CAMERA, FPS, ALARM = "fovea", 30.0, 30.0  # frames per second; spikes/s
 LEARNED = ("theta_1", "theta_2", "sigma_1", "t_de", "t_f", "tau_2", "weights", "c_w")
@@ -44,21 +44,17 @@ class Level(NamedTuple):
 
 def record(split: str, levels: range) -> Iterator[Level]:
     """Yield levels of a split; threats that are not ahead are left out."""
-    arguments = {
-        "split": split,
-        "camera": CAMERA,
-        "include_frame": True,
-        "config": {"action": {"type": "DiscreteDemand", "demands": [0.0, -1.0]}},
-    }
-    recorder = LevelRecorder("LGMD/RandomBraking-v0", arguments, shrink=1)
+    arguments = {"split": split, "camera": CAMERA, "include_frame": True}
+    recorder = DriveRecorder("LGMD/RandomBraking-v0", arguments, shrink=1, brakes=False)
     for start in range(levels.start, levels.stop, CHUNK):
         for (episode,) in recorder.record(range(start, min(start + CHUNK, levels.stop))):
-            if episode.threat and episode.family not in FORWARD:
+            threat = episode.time_to_brake[-1] == 0.0  # the level ends in a contact
+            if threat and episode.family not in FORWARD:
                 continue
             indices = np.arange(SETTLING, len(episode))
             useful, quiet = indices[:0], indices
-            if episode.threat:
-                timely = np.flatnonzero(~episode.braking_contacts)
+            if threat:
+                timely = np.flatnonzero(episode.time_to_brake > 0.0)
                 last = timely[-1] if len(timely) else -1
                 useful = indices[(indices >= last - USEFUL) & (indices <= last)]
                 quiet = indices[indices < len(episode) - QUIET]

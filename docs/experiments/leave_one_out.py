@@ -27,8 +27,9 @@ from lgmd_gym.benchmark.analysis.tables import rate_text
 from lgmd_gym.errors import check_known
 from lgmd_gym.statistics.intervals import Rate
 from lgmd_gym.training import TrainConfig
+from lgmd_gym.training.offline.dataset import StateDataset
 from lgmd_gym.training.offline.episodes import DrivenEpisode
-from lgmd_gym.training.offline.time_to_brake import StateDataset, TimeToBrakeLearner
+from lgmd_gym.training.offline.time_to_brake import TimeToBrakeLearner
 from lgmd_gym.training.recordings import load_or_record
 from lgmd_gym.training.trainer import CONFIG_FILE
 

@@ -23,8 +23,8 @@ class Train:
     """
 
     algo: str = "dqn"
-    """Algorithm: dqn, ppo, sac, or one of two that are trained on recorded episodes: offline (a brake that
-    latches) and time-to-brake (a brake that warns, brakes and is released)."""
+    """Algorithm: dqn, ppo, sac, or time-to-brake, which is trained on recorded episodes for a brake that
+    warns, brakes and is released."""
     env: str = "LGMD/RandomBraking-v0"
     """Environment id; random levels and traffic are trained on the split train, evaluated on validation."""
     camera: Names = None
@@ -37,13 +37,13 @@ class Train:
     inputs: Names = None
     """Policy inputs: spike_frequency, spike_peak, membrane_potential, ffi, ego_speed, speed_change,
     ego_yaw_rate and ego_acceleration; also frame; with the cameras of stopping-zone, also zones, zones_spikes
-    and zones_ffi; with those of all-round, also sides, sides_ffi, columns and known_deceleration.
+    and zones_ffi; with those of all-round, also sides_ffi, columns and known_deceleration.
     Default: from the hyperparameters."""
     demands: Annotated[tuple[float, ...] | None, arg(metavar="[X ...]")] = None
     """Demands that the policy chooses from, from -1 (full braking) to 1; --demands alone for a continuous
     demand. Default: 0 -1; continuous for sac; none for time-to-brake."""
     n_timesteps: Count = None
-    """Number of policy decisions; of recorded episodes for offline and time-to-brake. Default: from the
+    """Number of policy decisions; of recorded episodes for time-to-brake. Default: from the
     hyperparameters."""
     seed: int = 0
     """Seed of the network and the environments."""
@@ -54,10 +54,9 @@ class Train:
     eval_episodes: Count = None
     """Number of episodes per evaluation. Default: 96; for training on recordings, 600."""
     recordings: File = None
-    """Folder of a training run on recordings, with the same algorithm and cameras, to reuse its recorded
-    episodes."""
+    """Folder of a training run on recordings with the same cameras, to reuse its recorded episodes."""
     traffic_episodes: Count = None
-    """Number of traffic episodes, in which braking is false, that training on recordings uses in addition.
+    """Number of traffic episodes that training on recordings uses in addition.
     Default: from the hyperparameters, else 0."""
     extra_levels: Annotated[tuple[str, ...] | None, arg(metavar="N:NAME[,NAME...] [...]")] = None
     """Levels of some scenario families that training on recordings uses in addition, for example

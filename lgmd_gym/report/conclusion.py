@@ -175,5 +175,5 @@ def _policy_note(path: str) -> str:
         demands = f"{len(card.demands)} levels of demand" if card.demands else "a continuous demand"
     sensors = counted(cameras, "camera")
     algo = cast(Values, training).get("algo") if isinstance(training, dict) else card.algo
-    method = "offline training" if algo == "offline" else str(algo).upper()
+    method = str(algo).upper() if card.brake is None else str(algo)
     return f"Learned policy ({method}) with {sensors}, the inputs {inputs}, and {demands}."

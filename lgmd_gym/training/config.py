@@ -9,9 +9,9 @@ from typing import Any
 
 import gymnasium as gym
 
-from lgmd_gym.agents import AGENTS, HOLD, make_agent
+from lgmd_gym.agents import AGENTS, make_agent
 from lgmd_gym.agents.base import FPS
-from lgmd_gym.agents.policies.features import FRAME, LATCH_DEMAND, FeatureConfig
+from lgmd_gym.agents.policies.features import FRAME, FeatureConfig
 from lgmd_gym.agents.sides import all_round_cameras
 from lgmd_gym.aliases import Arguments, Config, Values
 from lgmd_gym.envs.attention import INATTENTIVE
@@ -28,13 +28,7 @@ from lgmd_gym.errors import (
 )
 from lgmd_gym.fields import Record, optional, record, text, value, whole
 from lgmd_gym.sensing.channel import ChannelSpec, make_channels, plain_values
-from lgmd_gym.training.hyperparams import (
-    ALGORITHMS,
-    OFFLINE,
-    RECORDED,
-    TIME_TO_BRAKE,
-    read_hyperparams,
-)
+from lgmd_gym.training.hyperparams import ALGORITHMS, TIME_TO_BRAKE, read_hyperparams
 from lgmd_gym.training.policy_env import PolicyWrapper
 
 RANDOM_ID = "LGMD/RandomBraking-v0"
@@ -43,7 +37,7 @@ CAMERAS = ("fovea", "tele", "wide")
 SEED_STRIDE = 1_000_000  # distance between the environment seeds of neighbouring training seeds
 MAX_SEED = 2**32 - 1  # of NumPy's global generator, which stable-baselines3 seeds
 VALIDATION_SEED = 10_000  # first environment seed of an evaluation
-DEMANDS = {"ppo": (0.0, -1.0), "dqn": (0.0, -1.0), "sac": (), OFFLINE: (0.0, -1.0), TIME_TO_BRAKE: ()}
+DEMANDS = {"ppo": (0.0, -1.0), "dqn": (0.0, -1.0), "sac": (), TIME_TO_BRAKE: ()}
 LEVELS_EXAMPLE = f"400:{','.join(EXTRA_FAMILIES[:2])}"
 TRAFFIC_EXAMPLE = "400:intersection,roundabout"
 
@@ -129,8 +123,7 @@ class TrainConfig(Record):
         100_000,
         "[1, inf)",
         "",
-        'Number of policy decisions over all environments; of recorded episodes for "offline" and '
-        '"time-to-brake"',
+        'Number of policy decisions over all environments; of recorded episodes for "time-to-brake"',
     )
     policy: str = text("MultiInputPolicy", "stable-baselines3's name of the network")
     algo_kwargs: Arguments = value(
@@ -141,34 +134,34 @@ class TrainConfig(Record):
         16_000,
         "[1, inf)",
         "",
-        'Number of decisions between two evaluations; "offline" evaluates after every epoch',
+        'Number of decisions between two evaluations; "time-to-brake" evaluates after every epoch',
     )
     eval_episodes: int = whole(96, "[1, inf)", "", "Number of episodes per evaluation")
     recordings: str | None = optional(
         text(
             None,
-            "Folder of an offline training run, to reuse its recorded episodes; None to record anew",
+            "Folder of a training run on recorded episodes, to reuse them; None to record anew",
         )
     )
     traffic_episodes: int = whole(
         0,
         "[0, inf)",
         "",
-        'Number of traffic episodes that "offline" trains on in addition; a quarter as many are added to its '
-        "evaluations",
+        'Number of traffic episodes that "time-to-brake" trains on in addition; a quarter as many are added '
+        "to its evaluations",
     )
     extra_levels: tuple[str, ...] = value(
         (),
         _texts(LEVELS_EXAMPLE),
-        'Levels that "offline" trains on in addition, a number and scenario families each, for example '
-        f'"{LEVELS_EXAMPLE}"; a twentieth as many are added to its evaluations',
+        'Levels that "time-to-brake" trains on in addition, a number and scenario families each, for '
+        f'example "{LEVELS_EXAMPLE}"; a twentieth as many are added to its evaluations',
     )
     extra_traffic: tuple[str, ...] = value(
         (),
         _texts(TRAFFIC_EXAMPLE),
-        'Traffic episodes of some kinds that "offline" trains on in addition, a number and the kinds each, '
-        f'for example "{TRAFFIC_EXAMPLE}" or "400:inattentive-highway" with drivers who err; a quarter as '
-        "many are added to its evaluations",
+        'Traffic episodes of some kinds that "time-to-brake" trains on in addition, a number and the kinds '
+        f'each, for example "{TRAFFIC_EXAMPLE}" or "400:inattentive-highway" with drivers who err; a quarter '
+        "as many are added to its evaluations",
     )
 
     def check(self) -> None:
@@ -178,15 +171,12 @@ class TrainConfig(Record):
         if self.algo == "sac" and self.demands:
             raise ValueError(f"sac requires a continuous demand, got demands {list(self.demands)}; omit them")
         _check_extra_episodes(self)
-        if self.algo == OFFLINE:
-            _check_offline(self)
         if self.algo == TIME_TO_BRAKE:
             _check_time_to_brake(self)
+            return
         for name in ("recordings", "traffic_episodes", "extra_levels", "extra_traffic"):
-            if getattr(self, name) and self.algo not in RECORDED:
-                raise ValueError(
-                    f"{name} requires algo {' or '.join(map(repr, RECORDED))}, got {self.algo!r}; omit it"
-                )
+            if getattr(self, name):
+                raise ValueError(f"{name} requires algo {TIME_TO_BRAKE!r}, got {self.algo!r}; omit it")
 
     @classmethod
     def from_hyperparams(
@@ -202,7 +192,7 @@ class TrainConfig(Record):
         """Return the configuration for an environment from a hyperparameter file.
 
         Args:
-            algo: "ppo", "sac", "dqn", "offline" or "time-to-brake".
+            algo: "ppo", "sac", "dqn" or "time-to-brake".
             env_id: Environment id; the entry `default` is used for an id without an entry.
             file: YAML file in rl-zoo's format; None for the file of this package.
             inputs: Inputs of the policy in place of those in the file.
@@ -226,7 +216,10 @@ class TrainConfig(Record):
         if check_items("inputs", inputs, str, "names"):
             values["features"] |= {"inputs": inputs}
         features = values["features"] = FeatureConfig.make(values["features"])
-        defaults: Arguments = {"demands": DEMANDS[algo], "eval_episodes": 600 if algo in RECORDED else 96}
+        defaults: Arguments = {
+            "demands": DEMANDS[algo],
+            "eval_episodes": 600 if algo == TIME_TO_BRAKE else 96,
+        }
         agent = features.cameras_of
         if agent is not None:
             defaults["camera"] = _cameras_of(agent)
@@ -374,27 +367,8 @@ def _check_extra_episodes(config: "TrainConfig") -> None:
         raise ValueError(f"extra_levels requires env {RANDOM_ID!r}, got {config.env_id!r}; omit it")
 
 
-def _check_offline(config: "TrainConfig") -> None:
-    """Raise ValueError for values that recorded episodes do not support."""
-    demands = config.demands
-    if sorted(demands)[1:] != [HOLD] or min(demands) > LATCH_DEMAND:
-        raise ValueError(
-            f"demands of algo 'offline' must be 0 and one of {LATCH_DEMAND} or less, "
-            f"got {list(demands)}; use for example --demands 0 -1"
-        )
-    if not config.features.latch:
-        raise ValueError("algo 'offline' requires latch: true in its hyperparameters")
-    _check_traffic(config)
-    if "speed_change" in config.features.inputs:
-        # A policy with this input braked in traffic whenever the driver accelerated.
-        raise ValueError(
-            "algo 'offline' does not support the input 'speed_change': the ego never accelerates in "
-            "recorded levels; remove it from the inputs"
-        )
-
-
 def _check_time_to_brake(config: "TrainConfig") -> None:
-    """Raise ValueError for values that driven episodes do not support."""
+    """Raise ValueError for values that recorded episodes do not support."""
     if config.demands:
         raise ValueError(
             f"algo 'time-to-brake' has a brake with stages, got demands {list(config.demands)}; omit demands"
@@ -403,11 +377,6 @@ def _check_time_to_brake(config: "TrainConfig") -> None:
         raise ValueError("algo 'time-to-brake' requires latch: false in its hyperparameters")
     if config.features.history != 1 or FRAME in config.features.inputs:
         raise ValueError("algo 'time-to-brake' requires history: 1 and inputs without frame")
-    _check_traffic(config)
-
-
-def _check_traffic(config: "TrainConfig") -> None:
-    """Raise ValueError for a configuration that episodes in traffic do not have."""
     changed = set(config.env_kwargs.get("config") or {}) - {"action"}
     if changed and (config.traffic_episodes or config.extra_traffic):
         raise ValueError(

@@ -17,11 +17,8 @@ from lgmd_gym.errors import (
 )
 from lgmd_gym.processes.inputs import read_text
 
-OFFLINE = "offline"  # the algorithm of `lgmd_gym.training.offline.learner`
 TIME_TO_BRAKE = "time-to-brake"  # the algorithm of `lgmd_gym.training.offline.time_to_brake`
-RECORDED = (OFFLINE, TIME_TO_BRAKE)
-"""Algorithms that learn from recorded episodes."""
-ALGORITHMS = ("ppo", "sac", "dqn", *RECORDED)
+ALGORITHMS = ("ppo", "sac", "dqn", TIME_TO_BRAKE)
 WRAPPER = "lgmd_gym.training.PolicyWrapper"
 OPTIONS = ("policy", "env_kwargs", "eval_episodes", "traffic_episodes", "extra_levels", "extra_traffic")
 """Further options of `TrainConfig` that a file may contain."""

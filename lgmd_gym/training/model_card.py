@@ -1,6 +1,5 @@
 """The model card of a training run: `README.md` in the format of the Hugging Face Hub."""
 
-import csv
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -48,11 +47,11 @@ class EvaluationResult(NamedTuple):
     """The best evaluation of a training run on the validation split."""
 
     mean: float  # mean return
-    std: float | None  # standard deviation over episodes; None if it was not recorded
-    episodes: int | None  # number of episodes; None for all recorded ones, levels and traffic segments
+    std: float  # standard deviation over episodes
+    episodes: int  # number of episodes
 
     def __str__(self) -> str:
-        return f"{self.mean:.2f}" if self.std is None else f"{self.mean:.2f} +/- {self.std:.2f}"
+        return f"{self.mean:.2f} +/- {self.std:.2f}"
 
 
 def write_model_card(config: TrainConfig, folder: Path, version: str) -> None:
@@ -62,8 +61,7 @@ def write_model_card(config: TrainConfig, folder: Path, version: str) -> None:
     result = best_result(folder)
     text = "The training had no evaluation."
     if result is not None:
-        number = "all recorded" if result.episodes is None else result.episodes
-        text = f"Best evaluation: mean return {result} over {number} episodes of `validation`."
+        text = f"Best evaluation: mean return {result} over {result.episodes} episodes of `validation`."
     page = _PAGE.format(
         algo=config.algo.upper(),
         env_id=config.env_id,
@@ -78,22 +76,14 @@ def write_model_card(config: TrainConfig, folder: Path, version: str) -> None:
 
 
 def best_result(folder: Path) -> EvaluationResult | None:
-    """Return the best evaluation in a training folder; None without one."""
-    online, offline = folder / "best" / "evaluations.npz", folder / "log" / "progress.csv"
-    if online.exists():
-        with np.load(online) as log:
-            results = log["results"]
-        best = results[results.mean(axis=1).argmax()]
-        return EvaluationResult(float(best.mean()), float(best.std()), best.size)
-    if offline.exists():
-        with offline.open(encoding="utf-8") as file:
-            rows = [*csv.DictReader(file)]
-        if rows and "mean_return" not in rows[0]:  # of time-to-brake, which has losses instead
-            return None
-        # The policy is that of the first epoch with the final best return, which may be a weighted one.
-        chosen = [row["mean_return"] for row in rows if row["best_return"] == rows[-1]["best_return"]]
-        return EvaluationResult(float(chosen[0]), None, None) if rows else None
-    return None
+    """Return the best evaluation in a training folder; None without one, as on recorded episodes."""
+    file = folder / "best" / "evaluations.npz"
+    if not file.exists():
+        return None
+    with np.load(file) as log:
+        results = log["results"]
+    best = results[results.mean(axis=1).argmax()]
+    return EvaluationResult(float(best.mean()), float(best.std()), best.size)
 
 
 def _metadata(config: TrainConfig, result: EvaluationResult | None) -> Values:

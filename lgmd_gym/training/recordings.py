@@ -1,18 +1,14 @@
-"""Recorded episodes of an offline training run: newly recorded, or reused from another run."""
+"""Recorded episodes of a training run: newly recorded, or reused from another run."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from functools import partial
 from itertools import chain
 from json import dumps, loads
 from pathlib import Path
-from typing import Any
 
 import gymnasium as gym
 
 import lgmd_gym
-from lgmd_gym.agents import HOLD
-from lgmd_gym.agents.policies.features import FRAME
 from lgmd_gym.aliases import Values
 from lgmd_gym.camera import BirdsEye
 from lgmd_gym.envs.registration import TRAFFIC_KINDS
@@ -25,11 +21,10 @@ from lgmd_gym.training.config import (
     parse_levels,
     parse_traffic,
 )
-from lgmd_gym.training.hyperparams import TIME_TO_BRAKE
-from lgmd_gym.training.offline.driving import DriveRecorder, TrafficDriveRecorder
+from lgmd_gym.training.offline.driving import DriveRecorder
 from lgmd_gym.training.offline.episodes import (
     CHUNK_SIZE,
-    Recorded,
+    DrivenEpisode,
     RecordFunction,
     check_file,
     is_complete,
@@ -37,7 +32,6 @@ from lgmd_gym.training.offline.episodes import (
     record_parallel,
     save,
 )
-from lgmd_gym.training.offline.recorder import EpisodeRecorder, LevelRecorder
 from lgmd_gym.training.offline.traffic import TrafficRecorder
 
 LEVEL_CHUNK_SIZE = 25  # levels recorded by one task of a process, for the environments of the engine
@@ -106,47 +100,24 @@ def _traffic_set(
     first += EXTRA_TRAFFIC_STRIDE * number
     seeds = range(first, first + (traffic.count if train else -(-traffic.count // TRAFFIC_RATIO)))
     params = config.env_kwargs.get("params")
-    recorder = TrafficRecorder(split, config.camera, traffic.names, _frame_shrink(config), params)
-    record = TrafficDriveRecorder(recorder).record if config.algo == TIME_TO_BRAKE else recorder.record
+    record = TrafficRecorder(split, config.camera, traffic.names, params).record
     name = f"extra-traffic{number}-{split}" if number else f"traffic-{split}"
     settings = {"kinds": list(traffic.names)} if number else {}
     return RecordingSet(name, seeds, record, option, settings, CHUNK_SIZE)
 
 
-def _level_recorder(config: TrainConfig, split: str) -> LevelRecorder | EpisodeRecorder | DriveRecorder:
-    """Return the recorder of the engine, or that of single environments where the engine has no id.
+def _level_recorder(config: TrainConfig, split: str) -> DriveRecorder:
+    """Return the recorder of levels.
 
     Raises:
-        ValueError: For time-to-brake with an environment or a camera that the engine does not have.
+        ValueError: For an environment or a camera that the engine does not have.
     """
-    if config.algo == TIME_TO_BRAKE:
-        if not _is_in_engine(config):
-            raise ValueError(
-                f"algo 'time-to-brake' requires a braking environment and no top view, got {config.env_id!r}"
-            )
-        return DriveRecorder(config.env_id, config.env_arguments(split), _frame_shrink(config))
-    if _is_in_engine(config):
-        return LevelRecorder(
-            config.env_id,
-            config.env_arguments(split),
-            brake=min(config.demands),
-            shrink=_frame_shrink(config),
-        )
-    return EpisodeRecorder(
-        partial(config.make_env, split),
-        hold=config.demands.index(HOLD),
-        brake=config.demands.index(min(config.demands)),
-        shrink=_frame_shrink(config),
-    )
-
-
-def _is_in_engine(config: TrainConfig) -> bool:
     top_view = any(isinstance(channel.camera, BirdsEye) for channel in make_channels(config.camera))
-    return gym.spec(config.env_id).vector_entry_point is not None and not top_view
-
-
-def _frame_shrink(config: TrainConfig) -> int | None:
-    return config.features.shrink if FRAME in config.features.inputs else None
+    if gym.spec(config.env_id).vector_entry_point is None or top_view:
+        raise ValueError(
+            f"algo {config.algo!r} requires a braking environment and no top view, got {config.env_id!r}"
+        )
+    return DriveRecorder(config.env_id, config.env_arguments(split))
 
 
 def origin_of(config: TrainConfig) -> Values:
@@ -154,14 +125,12 @@ def origin_of(config: TrainConfig) -> Values:
     values = config.to_dict()
     origin: Values = {"format": FORMAT, "lgmd_gym": lgmd_gym.__version__}
     origin |= {name: values[name] for name in ("env_id", "env_kwargs", "camera", "demands")}
-    if config.algo == TIME_TO_BRAKE:
-        origin["algo"] = TIME_TO_BRAKE
-    return loads(dumps(origin | {"shrink": _frame_shrink(config)}))  # lists in place of tuples
+    return loads(dumps(origin | {"algo": config.algo}))  # lists in place of tuples
 
 
 def load_or_record(
     config: TrainConfig, split: str, folder: Path, progress: bool = False, jobs: int = 1
-) -> Iterator[Any]:
+) -> Iterator[DrivenEpisode]:
     """Return the episodes of a split: reused if `config.recordings` is set, else recorded in the folder.
 
     Missing episodes are recorded at once; the files are loaded one by one as the episodes are consumed.
@@ -176,7 +145,7 @@ def load_or_record(
     return chain.from_iterable(_load(item, _folder_of(item, training)) for item in sets)
 
 
-def _load(recordings: RecordingSet, files: Path) -> Iterator[Recorded]:
+def _load(recordings: RecordingSet, files: Path) -> Iterator[DrivenEpisode]:
     """Yield the episodes of the seeds of a set, one file in memory at a time."""
     remaining = len(recordings.seeds)
     for file in sorted(files.glob("*.npz")):
@@ -187,11 +156,13 @@ def _load(recordings: RecordingSet, files: Path) -> Iterator[Recorded]:
 
 
 def check_recordings(config: TrainConfig) -> None:
-    """Check the recordings of another training run that a configuration reuses.
+    """Check that a configuration can be recorded, or the recordings of another training run that it reuses.
 
     Raises:
-        ValueError: If there are none or too few, or they were recorded with other settings.
+        ValueError: If the engine has no such environment, there are no or too few recordings, or they were
+            recorded with other settings.
     """
+    _level_recorder(config, "train")  # raises an error for another environment
     if config.recordings is None:
         return
     for split in ("train", "validation"):
@@ -234,7 +205,7 @@ def _record_missing(recordings: RecordingSet, files: Path, origin: Values, progr
             if is_complete(file) and check_file(file, origin) == len(part):
                 bar.update(len(part))
                 continue
-            by_seed: list[Sequence[Recorded]] = []
+            by_seed: list[list[DrivenEpisode]] = []
             for episodes in record_parallel(recordings.record, part, jobs, recordings.chunk_size):
                 by_seed.append(episodes)
                 bar.update()

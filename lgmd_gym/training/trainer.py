@@ -4,7 +4,6 @@ import inspect
 import json
 import time
 import warnings
-from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,15 +18,17 @@ from lgmd_gym.processes.inputs import read_json
 from lgmd_gym.processes.user_modules import error_reason
 from lgmd_gym.sensing.channel import plain_values
 from lgmd_gym.training.config import TrainConfig
-from lgmd_gym.training.hyperparams import RECORDED, TIME_TO_BRAKE
+from lgmd_gym.training.hyperparams import TIME_TO_BRAKE
 from lgmd_gym.training.model_card import write_model_card
 from lgmd_gym.training.policy_env import PolicyWrapper
 
 if TYPE_CHECKING:
     from stable_baselines3 import PPO
 
+    from lgmd_gym.training.offline.time_to_brake import TimeToBrakeLearner
+
 CONFIG_FILE = "config.json"
-SET_BY_TRAINER = {"policy", "env", "demands", "seed", "device", "tensorboard_log", "verbose", "self"}
+SET_BY_TRAINER = {"policy", "env", "seed", "device", "tensorboard_log", "verbose", "self"}
 """Arguments of algorithms that are not hyperparameters."""
 # Attributes of a saved model that describe its training only, such as paths.
 EXCLUDED = (
@@ -84,7 +85,7 @@ def resume(folder: Path, *, progress: bool = False, jobs: int = 1) -> Path:
             f"{str(folder)!r} contains no training to resume (no readable {CONFIG_FILE})"
         ) from None
     config = TrainConfig.from_dict(values)
-    if config.algo in RECORDED:
+    if config.algo == TIME_TO_BRAKE:
         from lgmd_gym.training.recordings import check_recordings
 
         check_recordings(config)
@@ -99,7 +100,7 @@ def check_config(config: TrainConfig) -> None:
     """
     env = config.make_policy_env("train")
     try:
-        if config.algo in RECORDED:
+        if config.algo == TIME_TO_BRAKE:
             from lgmd_gym.training.recordings import check_recordings
 
             _make_learner(config, env)
@@ -140,10 +141,9 @@ def _train(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path
 def _write_policy(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path:
     start = time.perf_counter()
     brake: TimeToBrakeParams | None = None
-    if config.algo in RECORDED:
-        model = _train_offline(config, folder, progress, jobs)
-        if config.algo == TIME_TO_BRAKE:
-            brake = TimeToBrakeParams.make(config.algo_kwargs.get("brake"))
+    if config.algo == TIME_TO_BRAKE:
+        model = _train_on_recordings(config, folder, progress, jobs)
+        brake = TimeToBrakeParams.make(config.algo_kwargs.get("brake"))
     else:
         from lgmd_gym.training.online import train_online
 
@@ -170,18 +170,21 @@ def _write_policy(config: TrainConfig, folder: Path, progress: bool, jobs: int) 
     return path
 
 
-def _train_offline(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> "PPO":
+def _train_on_recordings(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> "PPO":
     """Record the missing episodes, train on them and write the metrics of each epoch to the folder."""
     from stable_baselines3.common.logger import configure
     from tqdm import tqdm
 
+    from lgmd_gym.training.offline.dataset import StateDataset
     from lgmd_gym.training.recordings import load_or_record
 
     env = config.make_policy_env("train")
     learner = _make_learner(config, env)
     env.close()
     train_data, validation_data = (
-        _make_dataset(config, learner, load_or_record(config, split, folder, progress, jobs))
+        StateDataset(
+            load_or_record(config, split, folder, progress, jobs), config.features, learner.brake.limits_s
+        )
         for split in ("train", "validation")
     )
     logger = configure(str(folder / "log"), ["csv", "tensorboard"])
@@ -200,28 +203,14 @@ def _train_offline(config: TrainConfig, folder: Path, progress: bool, jobs: int)
         logger.close()
 
 
-def _make_dataset(config: TrainConfig, learner: Any, episodes: Iterable[Any]) -> Any:
-    """Return the data of recorded episodes in the form that a learner requires."""
-    from lgmd_gym.training.offline.dataset import OfflineDataset
-    from lgmd_gym.training.offline.time_to_brake import StateDataset
-
-    if config.algo == TIME_TO_BRAKE:
-        return StateDataset(episodes, config.features, learner.brake.limits_s)
-    return OfflineDataset(episodes, config.features)
-
-
-def _make_learner(config: TrainConfig, env: PolicyWrapper) -> Any:
+def _make_learner(config: TrainConfig, env: PolicyWrapper) -> "TimeToBrakeLearner":
     """Return the learner of recorded episodes.
 
     Raises:
         ValueError: For an unknown hyperparameter, or one out of range.
     """
-    from lgmd_gym.training.offline.learner import OfflineLearner
     from lgmd_gym.training.offline.time_to_brake import TimeToBrakeLearner
 
-    learner = TimeToBrakeLearner if config.algo == TIME_TO_BRAKE else OfflineLearner
-    known = {*inspect.signature(learner).parameters} - SET_BY_TRAINER
+    known = {*inspect.signature(TimeToBrakeLearner).parameters} - SET_BY_TRAINER
     check_keys(f"hyperparameter of {config.algo}", config.algo_kwargs, known)
-    if config.algo == TIME_TO_BRAKE:
-        return TimeToBrakeLearner(config.policy, env, seed=config.seed, **config.algo_kwargs)
-    return OfflineLearner(config.policy, env, config.demands, seed=config.seed, **config.algo_kwargs)
+    return TimeToBrakeLearner(config.policy, env, seed=config.seed, **config.algo_kwargs)

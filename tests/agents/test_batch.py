@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.agents import NeuronResponse, TraceFrame
+from support.policies import write_policy
 
 from lgmd_gym.agents import AGENTS, make_agents
 from lgmd_gym.agents.base import InfoArrays
@@ -114,16 +115,16 @@ def test_rows_of_several_environments_equal_those_of_one(name, trace):
 
 
 @pytest.mark.parametrize("lead", [policies.SAFE_LEAD, 1e9])
-def test_demands_of_a_policy_do_not_depend_on_the_number_of_environments(monkeypatch, lead):
+def test_demands_of_a_policy_do_not_depend_on_the_number_of_environments(monkeypatch, tmp_path, lead):
     pytest.importorskip("stable_baselines3")
     monkeypatch.setattr(policies, "SAFE_LEAD", lead)
-    demands = check_rows("policy:zones", 120, draw=approach_step)
+    demands = check_rows(f"policy:{write_policy(tmp_path / 'small.zip')}", 120, draw=approach_step)
     assert 0.02 < np.mean(demands < 0.0) < 0.999
 
 
-def test_a_policy_decides_for_several_environments_at_once(monkeypatch):
+def test_a_policy_decides_for_several_environments_at_once(monkeypatch, tmp_path):
     pytest.importorskip("stable_baselines3")
-    policy, calls = make_agents("policy:zones", NUM_ENVS), []
+    policy, calls = make_agents(f"policy:{write_policy(tmp_path / 'small.zip')}", NUM_ENVS), []
     monkeypatch.setattr(policy, "_decide_alone", lambda inputs, row: calls.append(row) or 0.0)
     observations, infos = random_step(np.random.default_rng(0), policy)
     policy.act(observations, InfoArrays(infos))

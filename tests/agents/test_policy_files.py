@@ -4,17 +4,22 @@ import json
 import zipfile
 
 import pytest
+from support.policies import write_policy
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.card import CARD
-from lgmd_gym.agents.policies.policy import SHIPPED
 
-SOURCE = SHIPPED / "zones.zip"
+pytest.importorskip("stable_baselines3")
 
 
-def copy_with_card(path, **values):
-    """Copy the shipped policy with changed values of its card; None deletes a value."""
-    with zipfile.ZipFile(SOURCE) as source, zipfile.ZipFile(path, "w") as target:
+@pytest.fixture(scope="module")
+def policy(tmp_path_factory):
+    return write_policy(tmp_path_factory.mktemp("policy") / "small.zip")
+
+
+def copy_with_card(policy, path, **values):
+    """Copy a policy with changed values of its card; None deletes a value."""
+    with zipfile.ZipFile(policy) as source, zipfile.ZipFile(path, "w") as target:
         for name in source.namelist():
             data = source.read(name)
             if name == CARD:
@@ -39,10 +44,9 @@ def copy_with_card(path, **values):
         ({"algo": "nix"}, "cannot be loaded with algo 'nix' .*; correct its card"),
     ],
 )
-def test_damaged_card(tmp_path, values, words):
-    pytest.importorskip("stable_baselines3")
+def test_damaged_card(policy, tmp_path, values, words):
     path = tmp_path / "policy.zip"
-    copy_with_card(path, **values)
+    copy_with_card(policy, path, **values)
     with pytest.raises(ValueError, match=words) as caught:
         make_agent(f"policy:{path}")
     assert "\n" not in str(caught.value)
@@ -50,17 +54,16 @@ def test_damaged_card(tmp_path, values, words):
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.99])
-def test_file_that_is_cut_off(tmp_path, share):
-    path, data = tmp_path / "policy.zip", SOURCE.read_bytes()
+def test_file_that_is_cut_off(policy, tmp_path, share):
+    path, data = tmp_path / "policy.zip", policy.read_bytes()
     path.write_bytes(data[: int(share * len(data))])
     with pytest.raises(ValueError, match="is not a policy file"):
         make_agent(f"policy:{path}")
 
 
-def test_damaged_weights(tmp_path):
-    pytest.importorskip("stable_baselines3")
+def test_damaged_weights(policy, tmp_path):
     path = tmp_path / "policy.zip"
-    with zipfile.ZipFile(SOURCE) as source, zipfile.ZipFile(path, "w") as target:
+    with zipfile.ZipFile(policy) as source, zipfile.ZipFile(path, "w") as target:
         for name in source.namelist():
             data = source.read(name)
             target.writestr(name, data[: len(data) // 2] if name == "policy.pth" else data)

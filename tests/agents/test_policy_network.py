@@ -11,12 +11,12 @@ import gymnasium as gym
 import numpy as np
 import pytest
 from gymnasium import spaces
+from support.policies import INPUTS, write_policy
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.card import CARD, write_card
 from lgmd_gym.agents.policies.features import announce_pickle
 from lgmd_gym.agents.policies.network import NetworkSpec, describe_network
-from lgmd_gym.agents.policies.policy import SHIPPED
 
 pytest.importorskip("stable_baselines3")
 
@@ -97,9 +97,14 @@ class Attack:
         return os.write, (2, b"executed\n")
 
 
-def attack(path, **changes):
-    """Write the shipped policy with a malicious pickle among its data and a changed card."""
-    with zipfile.ZipFile(SHIPPED / "zones.zip") as source, zipfile.ZipFile(path, "w") as target:
+@pytest.fixture(scope="module")
+def policy(tmp_path_factory):
+    return write_policy(tmp_path_factory.mktemp("policy") / "small.zip")
+
+
+def attack(policy, path, **changes):
+    """Write a policy with a malicious pickle among its data and a changed card."""
+    with zipfile.ZipFile(policy) as source, zipfile.ZipFile(path, "w") as target:
         for name in source.namelist():
             data = source.read(name)
             if name == "data":
@@ -114,15 +119,15 @@ def attack(path, **changes):
     return path
 
 
-def test_a_pickle_in_the_file_of_a_described_network_is_not_executed(tmp_path, capfd):
-    agent = make_agent(f"policy:{attack(tmp_path / 'policy.zip')}")
+def test_a_pickle_in_the_file_of_a_described_network_is_not_executed(policy, tmp_path, capfd):
+    agent = make_agent(f"policy:{attack(policy, tmp_path / 'policy.zip')}")
     assert capfd.readouterr().err == ""
-    shipped = make_agent("policy:zones").agent.network.state_dict()
-    assert all(torch.equal(value, shipped[name]) for name, value in agent.agent.network.state_dict().items())
+    original = make_agent(f"policy:{policy}").agent.network.state_dict()
+    assert all(torch.equal(value, original[name]) for name, value in agent.agent.network.state_dict().items())
 
 
-def test_a_line_precedes_the_execution_of_a_pickle(tmp_path, capfd):
-    path = attack(tmp_path / "policy.zip", network=None)
+def test_a_line_precedes_the_execution_of_a_pickle(policy, tmp_path, capfd):
+    path = attack(policy, tmp_path / "policy.zip", network=None)
     line = f"lgmd-gym: loading {str(path)!r} executes the pickled code in this file\n"
     for expected in (line + "executed\n", "executed\n"):
         with pytest.raises(ValueError, match="cannot be loaded"):
@@ -131,9 +136,9 @@ def test_a_line_precedes_the_execution_of_a_pickle(tmp_path, capfd):
 
 
 @pytest.mark.filterwarnings("ignore:Detected pickle protocol")
-def test_weights_are_not_unpickled(tmp_path, capfd):
+def test_weights_are_not_unpickled(policy, tmp_path, capfd):
     path = tmp_path / "policy.zip"
-    with zipfile.ZipFile(SHIPPED / "zones.zip") as source, zipfile.ZipFile(path, "w") as target:
+    with zipfile.ZipFile(policy) as source, zipfile.ZipFile(path, "w") as target:
         target.writestr(CARD, source.read(CARD))
         target.writestr("policy.pth", pickle.dumps(Attack()))
     with pytest.raises(ValueError, match="cannot be loaded"):
@@ -142,7 +147,6 @@ def test_weights_are_not_unpickled(tmp_path, capfd):
 
 
 NETWORK = {"policy": "MultiInputPolicy", "policy_kwargs": {"net_arch": {"pi": [64, 64], "vf": []}}}
-INPUTS = {"ego_speed": [1], "ego_yaw_rate": [1], "zones": [68]}
 
 
 @pytest.mark.parametrize(("changes", "words"), [
@@ -157,8 +161,8 @@ INPUTS = {"ego_speed": [1], "ego_yaw_rate": [1], "zones": [68]}
     ({"policy": "MultiInput"}, "did you mean 'MultiInputPolicy'"),
     ({"name": 7}, "unknown network field 'name'"),
 ])  # fmt: skip
-def test_a_wrong_description_is_refused(tmp_path, capfd, changes, words):
-    path = attack(tmp_path / "policy.zip", network=NETWORK | {"inputs": INPUTS} | changes)
+def test_a_wrong_description_is_refused(policy, tmp_path, capfd, changes, words):
+    path = attack(policy, tmp_path / "policy.zip", network=NETWORK | {"inputs": INPUTS} | changes)
     with pytest.raises(ValueError, match=words) as caught:
         make_agent(f"policy:{path}")
     assert "\n" not in str(caught.value)

@@ -11,7 +11,7 @@ from lgmd_gym.benchmark.run_folder import case_name, series_name
     ("agent", "condition", "name"),
     [
         ("stopping-zone", "clear", "quick_CCRs_v10__stopping-zone__seed3"),
-        ("policy:zones", "fog", "quick_CCRs_v10__policy_zones__seed3__fog"),
+        ("policy:all-round", "fog", "quick_CCRs_v10__policy_all-round__seed3__fog"),
         ("my-rule:gain=2,floor=1", "clear", "quick_CCRs_v10__my-rule_gain=2_floor=1__seed3"),
     ],
 )

@@ -85,10 +85,10 @@ def test_config_file_loads_its_agents_only_if_trusted(folder, tmp_path, capsys):
     [
         ("spike-threshold:threshold=45", None),
         ("stopping-zone", None),
-        ("policy:zones", None),
-        ("policy:zones.zip", "policy file 'zones.zip'"),
+        ("policy:all-round", None),
+        ("policy:all-round.zip", "policy file 'all-round.zip'"),
         ("policy:../x/policy.zip", "policy file '../x/policy.zip'"),
-        ("policy:zones:margin=1", None),
+        ("policy:all-round:margin=1", None),
         ("policy:my.zip:margin=1", "policy file 'my.zip'"),
         ("policy:C:/runs/lr=0.01/policy.zip", "policy file 'C:/runs/lr=0.01/policy.zip'"),
         ("os:system", "module 'os'"),

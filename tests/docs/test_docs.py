@@ -88,7 +88,7 @@ def test_code_blocks_run(path, tmp_path, monkeypatch):
         elif kind == "yaml":  # hyperparameters
             (tmp_path / "hyper.yml").write_text(block)
             file = tmp_path / "hyper.yml"
-            check_config(TrainConfig.from_hyperparams("offline", file=file, inputs=("frame",)))
+            check_config(TrainConfig.from_hyperparams("time-to-brake", file=file))
     sys.modules.pop("my_agent", None)
     forget_families()
 

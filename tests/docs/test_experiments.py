@@ -3,21 +3,16 @@
 import os
 import subprocess
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from support.examples import EXPERIMENTS, load
 from support.openscenario import START, scenario, write
-from support.recordings import synthetic_episode
 from support.rows import threat_row
 
-from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.benchmark import RunConfig, get_suite
 from lgmd_gym.benchmark.case import Case, Suite
 from lgmd_gym.benchmark.run_folder import StoredRun
-from lgmd_gym.training.offline.episodes import save
-from lgmd_gym.training.recordings import FORMAT
 
 
 def test_bodies(tmp_path):
@@ -85,15 +80,6 @@ def test_ablations(tmp_path, capsys):
     assert (tmp_path / "arms.png").stat().st_size > 5_000
     with pytest.raises(ValueError, match="agent 'ttc-oracle' has no cameras of its own"):
         example.main(["ttc-oracle", *arguments])
-
-
-@pytest.mark.slow
-def test_target_signal(capsys):
-    areas = load("target_signal").main(["--levels", "20", "--jobs", "1"])
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0].startswith("| fields at the sides | all | CBFA | ")
-    assert len(lines) == 2 + len(areas) == 8
-    assert all(0.0 <= value <= 1.0 for values in areas.values() for value in values.values())
 
 
 @pytest.mark.slow
@@ -183,53 +169,6 @@ def test_levels_of_the_leaderboard():
     cases = [dict(case.arguments) for case in get_suite(str(EXPERIMENTS / "levels.toml")).cases]
     assert [case["start_level"] for case in cases] == list(range(1000, 1400))
     assert all(case["num_levels"] == 1 and case["split"] == "test" for case in cases)
-
-
-def test_recorded_levels():
-    """An episode pays its rewards until it ends or the policy brakes."""
-    pytest.importorskip("stable_baselines3")
-    example = load("recorded_levels")
-    episode = synthetic_episode(9, seed=9)
-    features = FeatureConfig(inputs=("ego_speed",), history=1, repeat=2)
-    table = example.Decisions([[episode]], features, 1.0)
-    envs = example.RecordedLevels(table, num_envs=1, scale=0.5)
-    envs.seed(3)
-    envs.reset()
-    rewards = np.add.reduceat(episode.rewards, range(0, len(episode), 2))
-    for brake_at, expected in ((None, rewards), (1, [rewards[0], episode.braking_returns[2]])):
-        paid = []
-        for decision in range(len(expected)):
-            _, reward, ends, _ = envs.step(np.array([int(decision == brake_at)]))
-            paid.append(reward[0])
-        assert ends[0]
-        assert paid == pytest.approx([0.5 * value for value in expected])
-
-
-def test_rl_ablations(tmp_path, monkeypatch, capsys):
-    pytest.importorskip("stable_baselines3")
-    example = load("rl_ablations")
-    few = {"buffer_size": 200, "learning_starts": 64, "batch_size": 16}
-    features = {"inputs": ("frame", "ego_speed"), "repeat": 2}
-    arm = replace(example.ARMS["frames"], features=features, algo_kwargs=few)
-    monkeypatch.setitem(example.ARMS, "frames", arm)
-    for split, lengths in (("train", range(4, 24)), ("validation", range(4, 8))):
-        (tmp_path / "episodes" / split).mkdir(parents=True)
-        episodes = [[synthetic_episode(n, seed=n, threat=n % 2 == 0, frames=True)] for n in lengths]
-        save(episodes, tmp_path / "episodes" / split / "000000.npz", {"format": FORMAT})
-    example.main(tmp_path, ["frames"], seeds=1, levels=10, budget=0.002)
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "n = 1 seeds, 2 threats and 2 other validation levels"
-    assert lines[-1].startswith(f"| {arm.title} | ")
-    assert "nan" not in lines[-1]
-
-
-def test_policy_frontier():
-    """Braking at decision 2 of 8 avoids the contact, at 6 it does not; lead times are 6 and 2 decisions."""
-    pytest.importorskip("stable_baselines3")
-    threats = [synthetic_episode(8, seed=seed) for seed in range(3)]
-    others = [synthetic_episode(5, threat=False), synthetic_episode(5, threat=False, traffic=True)]
-    row = load("policy_frontier").frontier_row(1.0, threats + others, [2, 6, None, 0, None], rate_hz=10.0)
-    assert row == "| 1 | 1/3 [6.1–79.2] | 0.40 | 1/1 [20.7–100.0] | 0/1 [0.0–79.3] |"
 
 
 def test_failure_maps(tmp_path, capsys):

@@ -1,21 +1,22 @@
 """The script docs/experiments/neuron_ablation.py: inputs by value, and a run with a tiny budget."""
 
+import re
+
 import gymnasium as gym
 import numpy as np
 import pytest
 from support.examples import load
 
 from lgmd_gym.agents.policies.features import FeatureConfig
-from lgmd_gym.agents.sides import NUM_COLUMNS
+from lgmd_gym.agents.sides import NUM_COLUMNS, NUM_FORWARD_COLUMNS, NUM_FORWARD_FIELDS, NUM_SIDE_FIELDS
 from lgmd_gym.neuron import LGMDParams, make
 from lgmd_gym.sensing.sensor_array import SensorArray
 from lgmd_gym.training.offline.dataset import mirror_input, policy_inputs
-from lgmd_gym.training.offline.episodes import RecordedEpisode
+from lgmd_gym.training.offline.episodes import DrivenEpisode
 
 pytest.importorskip("stable_baselines3")
 
-MOTION = ("ego_speed", "ego_yaw_rate", "known_deceleration")
-NAMES = ("lgmd", "lgmd sides", "dsn sides", "edges sides")  # the order of `column_potential` of all-round
+NAMES = ("dsn", "dsn sides", "edges sides")  # the order of `column_potential` of all-round
 
 
 @pytest.fixture(scope="module")
@@ -23,30 +24,34 @@ def script():
     return load("neuron_ablation")
 
 
-def episode(length, seed, threat, **observations):
-    """Return a recording in which braking at once pays 1 for a threat, and costs 1 otherwise."""
-    sign = 1.0 if threat else -1.0
-    motion = {name: np.ones((length, 1), np.float32) for name in MOTION}
-    returns = np.linspace(sign, 0.0, length, dtype=np.float32)
-    contacts = (np.arange(length) > length // 2) & threat
-    rewards = np.full(length, -sign / length, np.float32)
-    return RecordedEpisode(motion | observations, rewards, returns, contacts, threat)
+def episode(script, length, threat, **observations):
+    """Return a level without braking; the last moment of a threat is one decision before its end."""
+    motion = {name: np.ones((length, 1), np.float32) for name in script.MOTION}
+    times = np.maximum(np.arange(length - 2, -2, -1), 0) / 30.0 if threat else np.full(length, np.inf)
+    demands = np.zeros(length, np.float32)
+    return DrivenEpisode(motion | observations, times.astype(np.float32), demands, threat)
 
 
 def test_inputs_are_those_of_the_policy(script):
     """Features of columns, their history and their mirror image, up to the rounding of float16."""
     rng = np.random.default_rng(4)
-    potential = rng.uniform(0.5, 1.0, (9, NUM_COLUMNS)).astype(np.float32)
-    features = FeatureConfig(inputs=("columns",), history=1, repeat=2)
-    (expected,) = policy_inputs([{"column_potential": potential}], features)
+    potential = rng.uniform(0.2, 0.95, (9, NUM_COLUMNS)).astype(np.float32)
+    features = FeatureConfig(inputs=("columns", *script.MOTION), history=1, repeat=2)
     levels = script.logarithmic(script.excitation(potential), 2.0).astype(np.float16)
     sizes = [len(script.mirror_of([name])[0]) // 4 for name in NAMES]
     parts = dict(zip(NAMES, np.split(levels, np.cumsum(sizes)[:-1], axis=1), strict=True))
-    dataset = script.FieldDataset([episode(9, 0, True, **parts)], NAMES)
+    recorded = episode(script, 9, True, **parts)
+    (expected,) = policy_inputs([recorded.observations | {"column_potential": potential}], features)
+    dataset = script.FieldDataset([recorded], NAMES)
+    assert dataset.bounds.tolist() == [0, 5]
+    assert dataset.names == sorted(features.inputs)
     for mirrored in (False, True):
-        (found,) = dataset.batch([0], [mirrored])[0]["columns"].split(5)
-        columns = mirror_input("columns", expected["columns"]) if mirrored else expected["columns"]
-        assert np.allclose(found.numpy(), columns.astype(np.float32), atol=2e-3)
+        found = dataset.batch(np.arange(5), np.full(5, mirrored)).numpy()
+        inputs = [expected[name] for name in dataset.names]
+        if mirrored:
+            inputs = [mirror_input(name, expected[name]) for name in dataset.names]
+        assert np.allclose(found, np.concatenate(inputs, axis=1), atol=2e-3)
+    assert dataset.classes.tolist() == [0] * 5  # below 0.3 s
 
 
 def test_pixels_are_linear(script):
@@ -60,8 +65,47 @@ def test_pixels_are_linear(script):
 def test_each_lens_is_drawn_once(script):
     """Six detectors share the ground, upright and low fields; three the near, middle and far pairs."""
     sensors = SensorArray(script.cameras(), 30.0, LGMDParams())
-    assert len(sensors.names) == 6 * 17 + 3 * 6
-    assert [len(group.frames[0]) for group in sensors._drawing.groups] == [7, 7, 3, 2, 2, 2]
+    assert len(sensors.names) == 6 * NUM_FORWARD_FIELDS + 3 * NUM_SIDE_FIELDS
+    assert [len(group.frames[0]) for group in sensors._drawing.groups] == [8, 8, 3, 2, 2, 2]
+    assert sensors.names[-NUM_SIDE_FIELDS:] == [f"{name}_edges" for name in side_names()]
+    assert sensors.names[-3 * NUM_SIDE_FIELDS :][:NUM_SIDE_FIELDS] == [
+        f"{name}_lgmd" for name in side_names()
+    ]
+
+
+def side_names():
+    return [f"{name}_{side}" for name in ("near", "middle", "far") for side in ("left", "right")]
+
+
+def test_levels_of_detectors_are_at_their_places(script):
+    """Each column and field of a channel has the level of its own response."""
+    size, fields = NUM_FORWARD_COLUMNS, NUM_FORWARD_FIELDS
+    rng = np.random.default_rng(0)
+    columns = rng.uniform(0.5, 0.9, (2, 6 * size + 3 * 30)).astype(np.float32)
+    ffi = rng.uniform(0.0, 9.0, (2, 6 * fields + 18)).astype(np.float32)
+    signals = {name: np.ones((2, 1), np.float32) for name in script.MOTION}
+    signals |= {"column_potential": columns, "ffi": ffi, "membrane_potential": 0.5 + ffi / 20.0}
+    levels = script.levels_of(signals | {"spike_frequency": ffi})
+    potential = script.logarithmic(script.excitation(columns), 2.0)
+    assert np.allclose(levels["off-only"], potential[:, size : 2 * size], atol=1e-3)
+    assert np.allclose(levels["dsn sides"], potential[:, 6 * size + 30 : 6 * size + 60], atol=1e-3)
+    expected = script.logarithmic(ffi[:, 6 * fields + 6 : 6 * fields + 12], 2.0)
+    assert np.allclose(levels["dsn ffi"], expected, atol=1e-3)
+    expected = script.logarithmic(ffi[:, fields : 2 * fields], 0.1)
+    assert np.allclose(levels["off-only spikes"], expected, atol=1e-3)
+    assert np.allclose(levels["pixels"], script.excitation(columns[:, 5 * size : 6 * size]) / 4.0, atol=1e-3)
+
+
+def test_sets_of_levels(script):
+    """Shares and families of the shipped policy; threats and their twins have the same seeds."""
+    numbers = np.array(
+        [script.CONFIG.n_timesteps, *(int(text.split(":")[0]) for text in script.CONFIG.extra_levels)]
+    )
+    sets = script.level_sets("validation", numbers.sum() // 10)
+    assert [len(seeds) for _, _, seeds in sets] == pytest.approx(numbers / 10, abs=1)
+    assert {seeds.start for _, _, seeds in sets} == {10_000}
+    assert sets[0][1] == []
+    assert sets[3][1] == [f"{family}WithoutTarget" for family in sets[2][1]]
 
 
 def test_world_of_a_level(script):
@@ -71,38 +115,55 @@ def test_world_of_a_level(script):
 
 
 def test_differences_are_paired(script):
-    """Two trainings; an arm returns 0.5 more in each level, avoids one threat more, and brakes as often."""
+    """Two trainings; an arm avoids one threat more and brakes as often in the level without a threat."""
     threats, worlds = np.array([True, True, False]), np.array([6000, 6001, 6001])
-    returns, brakes = np.array([1.0, -3.0, 0.0]), np.array([True, True, False])
-    reference = [script.Outcomes(returns + seed, brakes, np.array([True, False, False])) for seed in (0, 1)]
-    found = [item._replace(returns=item.returns + 0.5, contacts=np.full(3, False)) for item in reference]
+    reference = [script.Outcomes(seed + 0.0, seed + np.array([-1.0, 3.0, 2.0])) for seed in (0, 1)]
+    found = [item._replace(scores=item.scores + np.array([1.5, 0.0, 0.0])) for item in reference]
     first, report = (
-        script.report_of(script.Arm(name, ()), item, reference, threats, worlds)
+        script.report_of(name, item, reference, threats, worlds)
         for name, item in (("a", reference), ("|b|", found))
     )
-    assert first.means == pytest.approx((-1.0 / 6.0, 0.5, 0.0))
-    assert report.means == pytest.approx((1.0 / 3.0, 1.0, 0.0))
-    assert [item[:3] for item in report.differences] == [(0.5, 0.5, 0.5), (0.5, 0.0, 1.0), (0.0, 0.0, 0.0)]
+    assert (first.means, first.area) == ((0.5, 1.0), 0.5)
+    assert (report.means, report.area) == ((1.0, 1.0), 0.5)
+    assert [item[:3] for item in report.differences] == [(0.5, 0.0, 1.0), (0.0, 0.0, 0.0)]
     head, _, *rows = script.table("forward", [first, report]).splitlines()
-    assert head.endswith("| return against a | avoided | false activations |")
+    assert head.endswith("| area | avoided against a | false activations |")
     assert rows == [
-        "| a | −0.17 | 50.0 | 0.0 | – | – | – |",
-        r"| \|b\| | 0.33 | 100.0 | 0.0 | +0.50 [+0.50, +0.50] | +50.0 [+0.0, +100.0] | +0.0 [+0.0, +0.0] |",
+        "| a | 50.0 | 100.0 | 0.500 | – | – |",
+        r"| \|b\| | 100.0 | 100.0 | 0.500 | +50.0 [+0.0, +100.0] | +0.0 [+0.0, +0.0] |",
     ]
 
 
 def test_network_learns_from_its_columns(script):
-    """Columns are excited in threats only: the network brakes there at once, and in no other level."""
+    """Columns grow in threats only, and the scores of threats are above all others."""
     rng = np.random.default_rng(0)
-    episodes = [
-        episode(8, seed, seed % 2 == 0, lgmd=(rng.random((8, 170)) * (seed % 2 == 0)).astype(np.float16))
-        for seed in range(64)
-    ]
+    size = (60, NUM_FORWARD_COLUMNS)
+    growth = np.linspace(0.0, 1.0, 60)[:, None]
+    levels = [(growth * rng.random(size) * (seed % 2 == 0)).astype(np.float16) for seed in range(24)]
+    episodes = [episode(script, 60, seed % 2 == 0, lgmd=item) for seed, item in enumerate(levels)]
     dataset = script.FieldDataset(episodes, ("lgmd",))
-    found = script.outcomes(script.train(dataset, dataset, 0, 8), dataset)
-    assert found.brakes.tolist() == [seed % 2 == 0 for seed in range(64)]
-    assert not found.contacts.any()
-    assert found.returns.mean() > 0.9
+    scores = script.scores_of(script.train(dataset, dataset, 0, 20), dataset, episodes)
+    assert scores[::2].min() > scores[1::2].max() + 1.0
+
+
+def test_score_of_a_threat_ends_at_the_last_moment(script):
+    """The odds rise with the speed: the last two decisions of ten are too late."""
+
+    class Learner:
+        brake = script.TimeToBrakeParams()
+
+        def odds(self, dataset):
+            speed = dataset.batch(np.arange(len(dataset))).numpy()[:, [-3]]
+            return self.brake.odds(np.concatenate([speed, np.zeros((len(speed), 4))], axis=1))
+
+    lgmd = np.zeros((20, NUM_FORWARD_COLUMNS), np.float16)
+    episodes = [episode(script, 20, threat, lgmd=lgmd) for threat in (True, False)]
+    for item in episodes:
+        item.observations["ego_speed"][:] = np.arange(20)[:, None]
+    dataset = script.FieldDataset(episodes, ("lgmd",))
+    found = script.scores_of(Learner(), dataset, episodes)
+    expected = [np.log(np.exp(speed / 20.0) + 1.0) - np.log(3.0) for speed in (16, 18)]
+    assert found == pytest.approx(expected, abs=1e-3)
 
 
 @pytest.mark.slow
@@ -111,7 +172,7 @@ def test_run(script, tmp_path, capsys):
     arguments = [str(tmp_path), "--levels", "6", "--validation", "12", "--seeds", "1", "--epochs", "1"]
     first = script.main(arguments)
     lines = capsys.readouterr().out.splitlines()
-    assert "6 training levels, 6 of selection; results on " in "\n".join(lines)
+    assert any(re.match(r"[4-8] training levels, [5-9] of selection; results on ", line) for line in lines)
     assert {group: len(arms) for group, arms in first.items()} == {"forward": 6, "sides": 5, "fields": 4}
     assert sum(line.startswith("| lgmd, spike frequency |") for line in lines) == 1
     again = script.main(arguments)

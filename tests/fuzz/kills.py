@@ -26,7 +26,7 @@ sys.path[:0] = [str(Path(__file__).parents[1])]
 from support import processes as kills
 from support.clips import make_test_clip
 from support.fuzz import run_cases
-from support.recordings import OFFLINE_YAML
+from support.recordings import RECORDED_YAML
 from support.runs import read_rows, sorted_rows
 
 STROKES = 4  # of a command, each followed by its continuation
@@ -36,7 +36,7 @@ FILES = {
     "tiny.toml": 'name = "tiny"\n[[cases]]\nfamily = "CCRs"\nspeeds_kmh = [10, 20, 30]\n'
     '[[cases]]\nfamily = "EmptyRoad"\nspeeds_kmh = [30]\n',
     "traffic.toml": 'suite = "traffic"\nkinds = ["merge", "two-way"]\nseeds = 2\nagents = ["no-brake"]\n',
-    "offline.yml": OFFLINE_YAML.replace("n_timesteps: 6", "n_timesteps: 40"),
+    "recorded.yml": RECORDED_YAML.replace("n_timesteps: 6", "n_timesteps: 40"),
     "ppo.yml": """
 default:
   env_wrapper:
@@ -119,7 +119,7 @@ def parameters_of(folder):
 
 
 BENCH = "bench --suite tiny.toml --agents spike-threshold ttc-oracle"
-OFFLINE = "train --algo offline --camera fovea --jobs 2 --eval-episodes 8 --hyperparams offline.yml"
+RECORDED = "train --algo time-to-brake --camera fovea --jobs 2 --eval-episodes 8 --hyperparams recorded.yml"
 PPO = "train --algo ppo --camera fovea --eval-freq 64 --eval-episodes 2 --hyperparams ppo.yml"
 TUNE = "tune --agent danger-zone --trials 3 --levels 8 --seeds 0 --study out --best best.toml"
 COMMANDS = {
@@ -130,7 +130,7 @@ COMMANDS = {
     "outputs": Command(f"{BENCH} --seeds 1 --out out", "bench --resume out", run_of),
     "traffic": Command("bench --config traffic.toml --out out", "bench --resume out", rows_of),
     "ppo": Command(f"{PPO} --out out", "train --resume out", shapes_of),
-    "offline": Command(f"{OFFLINE} --out out", "train --resume out", policy_of),
+    "recorded": Command(f"{RECORDED} --out out", "train --resume out", policy_of),
     "tune": Command(TUNE, TUNE, parameters_of),
     "video": Command("video clip.mp4 --configs paper t_sf-60 --overlay --out out", None, traces_of),
     "gallery": Command("gallery --families CCRs --seeds 1 --out out", None, names_of),

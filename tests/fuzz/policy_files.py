@@ -18,7 +18,7 @@ from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.card import CARD
 from lgmd_gym.agents.policies.policy import SHIPPED
 
-SOURCE = SHIPPED / "zones.zip"
+SOURCE = SHIPPED / "all-round.zip"
 VALUES = (None, True, -1, 0, 7, 1e400, "", "ppo", "nix", [], [None], [2.0], ["zones"], {}, {"a": 1})
 
 

@@ -48,7 +48,7 @@ def test_other_installations(clone, tmp_path, monkeypatch):
 @pytest.mark.parametrize(("arguments", "module", "extra"), [
     (["train"], "tensorboard", "train"),
     (["tune"], "optuna", "train"),
-    (["bench", "--agents", "policy:zones"], "stable_baselines3", "train"),
+    (["bench", "--agents", "policy:all-round"], "stable_baselines3", "train"),
     (["drive", "LGMD/CCRs-v0", "--agent", "flow-divergence"], "cv2", "flow"),
     (["bench", "--backend", "dask", "--address", "tcp://x:1"], "distributed", "cluster"),
 ])  # fmt: skip

@@ -196,7 +196,7 @@ def test_a_wheel_built_from_the_sdist_is_complete_and_has_one_top_level_package(
             assert inside.as_posix() in names
     assert "lgmd_gym/py.typed" in names
     assert {f"lgmd_gym/neuron/export_c/{name}" for name in ("lgmd.c", "lgmd.h", "main.c")} < set(names)
-    assert "lgmd_gym/agents/policies/zones.zip" in names
+    assert "lgmd_gym/agents/policies/all-round.zip" in names
     zipfile.ZipFile(tmp_path / wheel).extractall(tmp_path / "site")
     code = "import gymnasium, lgmd_gym.envs as e; print(e.__file__); "
     code += "gymnasium.make('LGMD/CCRs-v0')"

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from support.recordings import OFFLINE_YAML, offline_config, write_yaml
+from support.recordings import RECORDED_YAML, recorded_config, write_yaml
 
 from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.camera import PRESETS
@@ -65,7 +65,7 @@ def test_invalid_hyperparameter_files_are_rejected(tmp_path, text, message):
 
 
 def test_options_replace_the_hyperparameters(tmp_path):
-    config = offline_config(tmp_path, inputs=("ffi",), n_timesteps=9, seed=None)
+    config = recorded_config(tmp_path, inputs=("ffi",), n_timesteps=9, seed=None)
     assert config.features.inputs == ("ffi",)
     assert config.features.repeat == 5
     assert (config.n_timesteps, config.seed) == (9, 0)
@@ -112,13 +112,7 @@ def test_cameras_are_presets_or_those_of_an_agent():
         TrainConfig.from_hyperparams("sac", sensors_of="spike-threshold")
     with pytest.raises(ValueError, match="unknown agent 'allround'; did you mean 'all-round'"):
         TrainConfig.from_hyperparams("sac", sensors_of="allround")
-    assert len(TrainConfig.from_hyperparams("sac", sensors_of="all-round").camera) == 35
-
-
-@pytest.mark.parametrize("demands", [(0.0, -0.4), (0.0, -0.5, -1.0), (-1.0,), (), (0.3, -1.0)])
-def test_offline_requires_holding_and_hard_braking(demands):
-    with pytest.raises(ValueError, match=r"must be 0 and one of -0\.5 or less, got .* --demands 0 -1"):
-        TrainConfig.from_hyperparams("offline", demands=demands)
+    assert len(TrainConfig.from_hyperparams("sac", sensors_of="all-round").camera) == 31
 
 
 @pytest.mark.parametrize(
@@ -138,24 +132,36 @@ def test_offline_requires_holding_and_hard_braking(demands):
             {"extra_levels": ["3:CCRs"]},
             "extra_levels requires algo .*, got 'dqn'",
         ),
-        ("offline", {"extra_levels": 3}, "extra_levels must be a list of texts such as '400:CCRsCurve,"),
-        ("offline", {"extra_levels": ["CCRs"]}, "extra_levels must be like '400:CCRsCurve,.*', got 'CCRs'"),
-        ("offline", {"extra_levels": ["-3:CCRs"]}, "extra_levels must be like .*, got '-3:CCRs'"),
         (
-            "offline",
+            "time-to-brake",
+            {"extra_levels": 3},
+            "extra_levels must be a list of texts such as '400:CCRsCurve,",
+        ),
+        (
+            "time-to-brake",
+            {"extra_levels": ["CCRs"]},
+            "extra_levels must be like '400:CCRsCurve,.*', got 'CCRs'",
+        ),
+        ("time-to-brake", {"extra_levels": ["-3:CCRs"]}, "extra_levels must be like .*, got '-3:CCRs'"),
+        (
+            "time-to-brake",
             {"extra_levels": ["0:CCRs"]},
             "of extra_levels must be a whole number >= 1, got 0",
         ),
-        ("offline", {"extra_levels": ["3:CCRs,"]}, "unknown family of random levels ''"),
-        ("offline", {"extra_levels": ["3:"]}, "extra_levels must be like .*, got '3:'"),
-        ("offline", {"extra_levels": ["3:CCRs,CCRs"]}, "extra_levels names a family twice: '3:CCRs,CCRs'"),
+        ("time-to-brake", {"extra_levels": ["3:CCRs,"]}, "unknown family of random levels ''"),
+        ("time-to-brake", {"extra_levels": ["3:"]}, "extra_levels must be like .*, got '3:'"),
         (
-            "offline",
+            "time-to-brake",
+            {"extra_levels": ["3:CCRs,CCRs"]},
+            "extra_levels names a family twice: '3:CCRs,CCRs'",
+        ),
+        (
+            "time-to-brake",
             {"extra_levels": ["3:CCRs", "3:CCRsCurv"]},
             "unknown family of random levels 'CCRsCurv'; did you mean 'CCRsCurve'",
         ),
         (
-            "offline",
+            "time-to-brake",
             {"env_id": "LGMD/CCRs-v0", "extra_levels": ["3:CCRs"]},
             "extra_levels requires env 'LGMD/RandomBraking-v0', got 'LGMD/CCRs-v0'",
         ),
@@ -165,40 +171,48 @@ def test_offline_requires_holding_and_hard_braking(demands):
             "extra_traffic requires algo .*, got 'dqn'",
         ),
         (
-            "offline",
+            "time-to-brake",
             {"extra_traffic": "3:highway"},
             "extra_traffic must be a list of texts such as '400:inter",
         ),
-        ("offline", {"extra_traffic": ["3"]}, "extra_traffic must be like '400:intersection,.*', got '3'"),
-        ("offline", {"extra_traffic": ["0:highway"]}, "extra_traffic must be a whole number >= 1, got 0"),
         (
-            "offline",
+            "time-to-brake",
+            {"extra_traffic": ["3"]},
+            "extra_traffic must be like '400:intersection,.*', got '3'",
+        ),
+        (
+            "time-to-brake",
+            {"extra_traffic": ["0:highway"]},
+            "extra_traffic must be a whole number >= 1, got 0",
+        ),
+        (
+            "time-to-brake",
             {"extra_traffic": ["3:merge, merge"]},
             "extra_traffic names a kind twice: '3:merge, merge'",
         ),
         (
-            "offline",
+            "time-to-brake",
             {"extra_traffic": ["3:merge", "3:roundabot"]},
             "unknown kind of traffic 'roundabot'; did you mean 'roundabout'",
         ),
         (
-            "offline",
+            "time-to-brake",
             {"extra_traffic": ["3:inattentive-merge,inattentive-highwy"]},
             "unknown kind of traffic 'inattentive-highwy'; did you mean 'inattentive-highway'",
         ),
-        ("offline", {"traffic_episodes": -1}, r"traffic_episodes must be in \[0, inf\), got -1"),
+        ("time-to-brake", {"traffic_episodes": -1}, r"traffic_episodes must be in \[0, inf\), got -1"),
         (
-            "offline",
+            "time-to-brake",
             {"traffic_episodes": 3, "env_kwargs": {"config": {"reward": {"brake": 5.0}}}},
             "traffic episodes have the default reward, got others in config of env_kwargs",
         ),
         (
-            "offline",
+            "time-to-brake",
             {"extra_traffic": ["3:merge"], "env_kwargs": {"config": {"brake": {"jerk": 5.0}}}},
             "traffic episodes have the default brake, got others in config of env_kwargs",
         ),
         (
-            "offline",
+            "time-to-brake",
             {"extra_levels": ["5:CCRsCurve", "3:StandingBox,CCRsCurve"]},
             "extra_levels names 'CCRsCurve' in two sets, which would contain the same levels",
         ),
@@ -213,7 +227,6 @@ def test_offline_requires_holding_and_hard_braking(demands):
         ("ppo", {"seed": 2**32}, r"seed must be in \[0, 4294967295\], got 4294967296"),
         ("ppo", {"algo_kwargs": {"policy_kwargs": "dict()"}}, "policy_kwargs must be dict or NoneType"),
         ("ppo", {"inputs": ("ffi", "ego_speed", "ffi")}, "each policy input once, got 'ffi' twice"),
-        ("offline", {"inputs": ("zones", "speed_change")}, "does not support the input 'speed_change'"),
         ("ppo", {"n_timestep": 3}, "unknown training option 'n_timestep'; did you mean 'n_timesteps'"),
     ],
 )
@@ -247,10 +260,12 @@ def test_training_without_levels_leaves_out_the_seeds_of_validation_and_test(env
     config = TrainConfig.from_hyperparams("ppo", env_id, inputs=("ffi",), camera="fovea", seed=2)
     assert config.first_seed == first
     assert replace(config, seed=0).first_seed == first - 2_000_000
-    recordings = TrainConfig.from_hyperparams("offline", env_id, inputs=("ffi",), camera="fovea", seed=2)
-    assert [recording_sets(recordings, split)[0].seeds[0] for split in ("train", "validation")] == [
-        first, VALIDATION_SEED,
-    ]  # fmt: skip
+    if "Traffic" not in env_id:
+        config = TrainConfig.from_hyperparams(
+            "time-to-brake", env_id, inputs=("ffi",), camera="fovea", seed=2
+        )
+        seeds = [recording_sets(config, split)[0].seeds[0] for split in ("train", "validation")]
+        assert seeds == [first, VALIDATION_SEED]
 
 
 def test_unknown_keys_in_a_stored_config_are_rejected():
@@ -259,25 +274,23 @@ def test_unknown_keys_in_a_stored_config_are_rejected():
         TrainConfig.from_dict(values | {"sed": 1})
 
 
-def test_offline_requires_a_latching_brake(tmp_path):
-    config = offline_config(tmp_path)
-    with pytest.raises(ValueError, match="requires latch: true"):
-        replace(config, features=replace(config.features, latch=False))
-
-
 @pytest.mark.parametrize(
     ("algo", "algo_kwargs", "message"),
     [
         ("ppo", {"seed": 3}, "unknown hyperparameter of ppo 'seed'"),
-        ("offline", {"seed": 3}, "unknown hyperparameter of offline 'seed'"),
-        ("offline", {"mirror": True}, "mirror does not support the input 'ffi'; set mirror to false"),
+        ("time-to-brake", {"seed": 3}, "unknown hyperparameter of time-to-brake 'seed'"),
+        ("time-to-brake", {"mirror": True}, "mirror does not support the input 'ffi'; set mirror to false"),
         ("ppo", {"learning_rat": 0.1}, "hyperparameter of ppo 'learning_rat'; did you mean 'learning_rate'"),
-        ("offline", {"epochs": 3}, "unknown hyperparameter of offline 'epochs'; did you mean 'n_epochs'"),
-        ("offline", {"batch_size": 0}, "batch_size must be a whole number >= 1, got 0"),
-        ("offline", {"logit_decay": -1.0}, r"logit_decay must be in \[0, 1\]"),
-        ("offline", {"initial_brake_probability": 1.0}, "initial_brake_probability must be in"),
-        ("offline", {"select_margin": -1}, "select_margin must be true or false, got -1"),
-        ("offline", {"false_cost": 0.0}, "false_cost must be a number > 0"),
+        (
+            "time-to-brake",
+            {"epochs": 3},
+            "unknown hyperparameter of time-to-brake 'epochs'; did you mean 'n_epochs'",
+        ),
+        ("time-to-brake", {"batch_size": 0}, "batch_size must be a whole number >= 1, got 0"),
+        ("time-to-brake", {"weight_decay": -1.0}, r"weight_decay must be in \[0, 1\]"),
+        ("time-to-brake", {"dropout": 1.0}, r"dropout must be in \[0, 0.9\]"),
+        ("time-to-brake", {"mirror": -1}, "mirror must be true or false, got -1"),
+        ("time-to-brake", {"learning_rate": 0.0}, "learning_rate must be a number > 0"),
     ],
 )
 def test_invalid_algorithm_arguments_are_rejected(tmp_path, algo, algo_kwargs, message):
@@ -299,14 +312,14 @@ def test_invalid_algorithm_arguments_are_rejected(tmp_path, algo, algo_kwargs, m
         (["--sensors-of", "stopping-zone", "--camera", "wide"], "use either camera or sensors_of"),
         (["--n-timesteps", "0"], "n_timesteps must be in [1, inf), got 0"),
         (["--jobs", "0"], "jobs must be a whole number >= 1, got 0"),
-        (["--extra-levels", "3:CCRs"], "extra_levels requires algo 'offline' or"),
+        (["--extra-levels", "3:CCRs"], "extra_levels requires algo 'time-to-brake', got 'dqn'"),
         (
             ["--extra-traffic", "3:merge"],
-            "extra_traffic requires algo 'offline' or",
+            "extra_traffic requires algo 'time-to-brake', got 'dqn'",
         ),
         (
             ["--traffic-episodes", "3"],
-            "traffic_episodes requires algo 'offline' or",
+            "traffic_episodes requires algo 'time-to-brake', got 'dqn'",
         ),
         (["--eval-episodes", "0"], "eval_episodes must be in [1, inf), got 0"),
     ],
@@ -321,14 +334,14 @@ def test_command_prints_one_line_for_invalid_options(arguments, message, capsys,
 
 
 def test_command_rejects_unknown_hyperparameters_in_a_file(tmp_path, capsys):
-    file = write_yaml(tmp_path, OFFLINE_YAML.replace("batch_size", "batchsize"))
+    file = write_yaml(tmp_path, RECORDED_YAML.replace("batch_size", "batchsize"))
     out = tmp_path / "run"
-    assert cli.run(["train", "--algo", "offline", "--hyperparams", str(file), "--out", str(out)]) == 2
+    assert cli.run(["train", "--algo", "time-to-brake", "--hyperparams", str(file), "--out", str(out)]) == 2
     assert "did you mean 'batch_size'" in capsys.readouterr().err
     assert not out.exists()
 
 
-WITHOUT_LAYERS = {"n_networks": 2, "policy_kwargs": {"net_arch": {"vf": [8]}}}
+WITHOUT_LAYERS = {"mirror": False, "n_networks": 2, "policy_kwargs": {"net_arch": {"vf": [8]}}}
 
 
 @pytest.mark.parametrize(
@@ -337,11 +350,12 @@ WITHOUT_LAYERS = {"n_networks": 2, "policy_kwargs": {"net_arch": {"vf": [8]}}}
         ("ppo", {"policy": "MlpPolicyX"}, "cannot make ppo .*MlpPolicyX"),
         ("ppo", {"algo_kwargs": {"learning_rate": "lin_abc"}}, "cannot make ppo .*abc"),
         ("dqn", {"algo_kwargs": {"train_freq": "often"}}, "cannot make dqn "),
-        ("offline", {"algo_kwargs": WITHOUT_LAYERS}, "net_arch of an ensemble must contain 'pi'"),
+        ("time-to-brake", {"algo_kwargs": WITHOUT_LAYERS}, "net_arch of an ensemble must contain 'pi'"),
     ],
 )
 def test_an_algorithm_that_cannot_be_made_is_rejected_before_the_training(algo, options, message):
-    options |= {"features": FeatureConfig(inputs=("ego_speed",), latch=True), "demands": DEMANDS[algo]}
+    features = FeatureConfig(inputs=("ego_speed",), history=1)
+    options |= {"features": features, "demands": DEMANDS[algo]}
     config = TrainConfig(algo=algo, env_id="LGMD/CCRs-v0", camera="fovea", **options)
     with pytest.raises(ValueError, match=message) as caught:
         check_config(config)
@@ -349,11 +363,13 @@ def test_an_algorithm_that_cannot_be_made_is_rejected_before_the_training(algo, 
 
 
 def test_traffic_is_recorded_with_the_neuron_of_the_levels(tmp_path):
-    config = replace(offline_config(tmp_path), traffic_episodes=1, env_kwargs={"params": {"t_sp": 0.6}})
+    config = replace(recorded_config(tmp_path), traffic_episodes=1, env_kwargs={"params": {"t_sp": 0.6}})
     _, traffic = recording_sets(config, "train")
     assert traffic.record.__self__.params == {"t_sp": 0.6}
 
 
 def test_reused_recordings_have_an_absolute_path(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert config_of(Train(algo="offline", recordings=Path("other"))).recordings == str(tmp_path / "other")
+    assert config_of(Train(algo="time-to-brake", recordings=Path("other"))).recordings == str(
+        tmp_path / "other"
+    )

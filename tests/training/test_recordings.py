@@ -4,12 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.recordings import offline_config, synthetic_episode
+from support.recordings import recorded_config, synthetic_episode
 
 from lgmd_gym.envs.registration import TRAFFIC_KINDS, traffic_id
 from lgmd_gym.training import recordings, train
+from lgmd_gym.training.config import RANDOM_ID
+from lgmd_gym.training.offline.driving import DriveRecorder
 from lgmd_gym.training.offline.episodes import _difference, check_file, load, save
-from lgmd_gym.training.offline.recorder import EpisodeRecorder, LevelRecorder
 from lgmd_gym.training.recordings import check_recordings, load_or_record, origin_of, recording_sets
 
 
@@ -28,7 +29,7 @@ def test_files_restore_every_episode(tmp_path):
     for left, right in zip((threat, segment), restored, strict=True):
         assert (left.threat, left.traffic) == (right.threat, right.traffic)
         assert left.family == right.family != ""
-        for name in ("rewards", "braking_returns", "braking_contacts"):
+        for name in ("time_to_brake", "demands"):
             assert np.array_equal(getattr(left, name), getattr(right, name))
         for name in left.observations:
             assert np.array_equal(left.observations[name], right.observations[name])
@@ -42,7 +43,7 @@ def test_file_without_episodes_is_rejected(tmp_path, text):
 
 
 def test_a_damaged_file_is_rejected_before_training(tmp_path):
-    config = offline_config(tmp_path, recordings=str(tmp_path), eval_episodes=1, n_timesteps=1)
+    config = recorded_config(tmp_path, recordings=str(tmp_path), eval_episodes=1, n_timesteps=1)
     for name in ("train", "validation"):
         write_episodes(tmp_path / "episodes" / name, config, [[synthetic_episode()]])
     file = tmp_path / "episodes" / "train" / "0.npz"
@@ -69,19 +70,19 @@ def test_the_message_for_other_settings_shows_the_first_difference():
             r'another camera \("fovea", not {"name": "fovea", "shape": \[9, 16\]}\)',
         ),
         ({"n_timesteps": 9}, "holds 2 episodes, 9 are required; reduce the number"),
-        ({"inputs": ("frame",), "n_timesteps": 2}, "recorded with another shrink"),
+        ({"env_kwargs": {"world": 3}, "n_timesteps": 2}, "recorded with another env_kwargs"),
     ],
 )
 def test_unsuitable_recordings_are_rejected(tmp_path, options, message):
     for _ in range(2):
-        write_episodes(tmp_path / "episodes" / "train", offline_config(tmp_path), [[synthetic_episode()]])
-    config = offline_config(tmp_path, recordings=str(tmp_path), **options)
+        write_episodes(tmp_path / "episodes" / "train", recorded_config(tmp_path), [[synthetic_episode()]])
+    config = recorded_config(tmp_path, recordings=str(tmp_path), **options)
     with pytest.raises(ValueError, match=message):
         check_recordings(config)
 
 
 def test_missing_recordings_are_rejected_before_the_folder_is_made(tmp_path):
-    config = offline_config(tmp_path, recordings=str(tmp_path / "missing"))
+    config = recorded_config(tmp_path, recordings=str(tmp_path / "missing"))
     with pytest.raises(ValueError, match=r"no recorded episodes in .*missing.*; train once with"):
         train(config, tmp_path / "run")
     assert not (tmp_path / "run").exists()
@@ -97,15 +98,15 @@ def test_interrupted_recording_resumes_at_the_missing_file(tmp_path, monkeypatch
         return [[synthetic_episode(seed=seed)] for seed in seeds]
 
     monkeypatch.setattr(recordings, "FILE_SIZE", 2)
-    monkeypatch.setattr(LevelRecorder, "record", record)
-    config = offline_config(tmp_path, n_timesteps=5)
+    monkeypatch.setattr(DriveRecorder, "record", record)
+    config = recorded_config(tmp_path, n_timesteps=5)
     with pytest.raises(KeyboardInterrupt):
         load_or_record(config, "train", tmp_path)
     del recorded[:1]
     episodes = load_or_record(config, "train", tmp_path)
     assert recorded == [range(2, 4), range(4, 5)]
-    expected = [synthetic_episode(seed=seed).rewards[0] for seed in range(5)]
-    assert [episode.rewards[0] for episode in episodes] == expected
+    expected = [synthetic_episode(seed=seed).observations["ego_speed"][0] for seed in range(5)]
+    assert [episode.observations["ego_speed"][0] for episode in episodes] == expected
     del recorded[:]
     load_or_record(replace(config, n_timesteps=6), "train", tmp_path)
     assert recorded == [range(4, 6)]  # of the last file, which had one seed
@@ -113,19 +114,18 @@ def test_interrupted_recording_resumes_at_the_missing_file(tmp_path, monkeypatch
         load_or_record(replace(config, env_kwargs={"world": 3}), "train", tmp_path)
 
 
-def test_recorder_is_that_of_the_engine_where_it_has_the_id(tmp_path):
-    engine, traffic = (
-        recording_sets(offline_config(tmp_path, env_id), "train")[0].record.__self__
-        for env_id in ("LGMD/RandomBraking-v0", traffic_id(next(iter(TRAFFIC_KINDS))))
-    )
-    assert isinstance(engine, LevelRecorder)
-    assert isinstance(traffic, EpisodeRecorder)
-    top_view = offline_config(tmp_path, camera="birdseye")
-    assert isinstance(recording_sets(top_view, "train")[0].record.__self__, EpisodeRecorder)
+@pytest.mark.parametrize(
+    ("env_id", "camera"), [(traffic_id(next(iter(TRAFFIC_KINDS))), "fovea"), (RANDOM_ID, "birdseye")]
+)
+def test_environments_that_the_engine_does_not_have_are_rejected(tmp_path, env_id, camera):
+    config = recorded_config(tmp_path, env_id, camera=camera)
+    with pytest.raises(ValueError, match=f"requires a braking environment and no top view, got '{env_id}'"):
+        train(config, tmp_path / "run")
+    assert not (tmp_path / "run").exists()
 
 
 def test_traffic_recordings_are_required_in_addition(tmp_path):
-    config = offline_config(
+    config = recorded_config(
         tmp_path, recordings=str(tmp_path), traffic_episodes=9, eval_episodes=1, n_timesteps=1
     )
     sets = [*recording_sets(config, "train"), *recording_sets(config, "validation")]
@@ -136,7 +136,7 @@ def test_traffic_recordings_are_required_in_addition(tmp_path):
     assert min(traffic_train | traffic_validation) >= 10_000  # the traffic suite uses the seeds from 0 on
     for name in ("train", "validation"):
         write_episodes(tmp_path / "episodes" / name, config, [[synthetic_episode()]])
-    with pytest.raises(ValueError, match="--algo offline --traffic-episodes 9, without --recordings"):
+    with pytest.raises(ValueError, match="--algo time-to-brake --traffic-episodes 9, without --recordings"):
         check_recordings(config)
     for name in ("traffic-train", "traffic-validation"):
         by_seed = [[], [synthetic_episode(), synthetic_episode()], []]
@@ -148,7 +148,7 @@ def test_traffic_recordings_are_required_in_addition(tmp_path):
 
 def test_extra_traffic_has_seeds_and_kinds_of_its_own(tmp_path):
     texts = ["9:merge,two-way", "4:merge"]
-    config = offline_config(tmp_path, traffic_episodes=5, extra_traffic=texts)
+    config = recorded_config(tmp_path, traffic_episodes=5, extra_traffic=texts)
     sets = [item for split in ("train", "validation") for item in recording_sets(config, split)]
     traffic = {item.name: item for item in sets if "traffic" in item.name}
     assert {name: len(item.seeds) for name, item in traffic.items()} == {
@@ -171,24 +171,23 @@ def test_extra_traffic_has_seeds_and_kinds_of_its_own(tmp_path):
 
 def test_extra_levels_are_of_the_chosen_families(tmp_path):
     texts = ["41:CurvePass", "20:CCRs,EmptyRoad"]
-    config = offline_config(tmp_path, extra_levels=texts, eval_episodes=2, n_timesteps=3)
+    config = recorded_config(tmp_path, extra_levels=texts, eval_episodes=2, n_timesteps=3)
     sets = [*recording_sets(config, "train"), *recording_sets(config, "validation")]
     names = ["train", "extra1-train", "extra2-train", "validation", "extra1-validation", "extra2-validation"]
     assert [item.name for item in sets] == names
     assert [len(item.seeds) for item in sets] == [3, 41, 20, 2, 3, 1]
     ((episode,),) = sets[1].record(range(1))
-    assert not episode.threat
-    assert len(episode) == pytest.approx(7.3 * 30, abs=9)  # the third car is met after 7 s
+    assert (episode.family, episode.threat) == ("CurvePass", False)
     assert {episode.family for (episode,) in sets[2].record(range(6))} == {"CCRs", "EmptyRoad"}
 
 
 def test_reused_extra_levels_are_of_the_same_families(tmp_path):
     text = "1:CurvePass"
-    config = offline_config(tmp_path, extra_levels=[text], eval_episodes=1, n_timesteps=1)
+    config = recorded_config(tmp_path, extra_levels=[text], eval_episodes=1, n_timesteps=1)
     reused = replace(config, recordings=str(tmp_path))
     for name in ("train", "validation"):
         write_episodes(tmp_path / "episodes" / name, config, [[synthetic_episode()]])
-    with pytest.raises(ValueError, match=f"--algo offline --extra-levels {text}, without"):
+    with pytest.raises(ValueError, match=f"--algo time-to-brake --extra-levels {text}, without"):
         check_recordings(reused)
     for name in ("extra1-train", "extra1-validation"):
         folder = tmp_path / "episodes" / name
@@ -202,8 +201,8 @@ def test_a_damaged_file_is_recorded_again(tmp_path, monkeypatch):
     def record(self, seeds):
         return [[synthetic_episode(seed=seed)] for seed in seeds]
 
-    monkeypatch.setattr(LevelRecorder, "record", record)
-    config = offline_config(tmp_path, n_timesteps=2)
+    monkeypatch.setattr(DriveRecorder, "record", record)
+    config = recorded_config(tmp_path, n_timesteps=2)
     load_or_record(config, "train", tmp_path)
     (file,) = (tmp_path / "episodes" / "train").iterdir()
     whole = file.read_bytes()

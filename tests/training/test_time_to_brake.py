@@ -7,15 +7,16 @@ import numpy as np
 import pytest
 import torch
 from gymnasium import spaces
-from support.recordings import synthetic_episode, write_yaml
+from support.recordings import write_yaml
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.statistics.ranks import roc_area
 from lgmd_gym.training import TrainConfig, train
-from lgmd_gym.training.offline.driving import DriveRecorder, PulseDriver, driven
-from lgmd_gym.training.offline.episodes import DrivenEpisode, load, save
-from lgmd_gym.training.offline.time_to_brake import StateDataset, TimeToBrakeLearner, leave_out
+from lgmd_gym.training.offline.dataset import StateDataset
+from lgmd_gym.training.offline.driving import NUM_ENVS, DriveRecorder, PulseDriver
+from lgmd_gym.training.offline.episodes import DrivenEpisode, load, record_parallel, save
+from lgmd_gym.training.offline.time_to_brake import TimeToBrakeLearner, leave_out
 
 ARGUMENTS = {"camera": "fovea", "families": ["CCRs", "EmptyRoad"], "world": "laboratory"}
 
@@ -88,11 +89,39 @@ def test_drivers_brake_at_a_time_to_brake_and_release():
         assert first.act(index / 30.0, inf) == second.act(index / 30.0, inf)
 
 
-def test_an_episode_without_braking_has_the_time_to_its_last_moment():
-    episode = driven(synthetic_episode(length=6))  # braking at the decisions 0 to 3 avoids the contact
-    assert episode.time_to_brake == pytest.approx([3 / 30, 2 / 30, 1 / 30, 0, 0, 0])
-    assert episode.demands.tolist() == [0.0] * 6
-    assert np.isinf(driven(synthetic_episode(threat=False, traffic=True)).time_to_brake).all()
+def test_levels_without_braking_end_at_the_contact():
+    """The time to brake falls from the first decision on; frames are those of a single environment."""
+    arguments = ARGUMENTS | {"camera": {"name": "wide", "shape": (24, 32)}, "include_frame": True}
+    recorder = DriveRecorder("LGMD/RandomBraking-v0", arguments, shrink=2, brakes=False)
+    levels = [episode for (episode,) in recorder.record(range(NUM_ENVS + 1))]
+    assert {episode.threat for episode in levels} == {False, True}
+    for episode in levels:
+        assert not episode.demands.any()
+        expected = episode.time_to_brake[0] - np.arange(len(episode)) / 30.0
+        assert episode.time_to_brake == pytest.approx(np.maximum(expected, 0.0), abs=1e-4)
+        assert (episode.time_to_brake[-1] == 0.0) == episode.threat
+    env = gym.make("LGMD/RandomBraking-v0", **arguments)
+    observation, _ = env.reset(seed=1)
+    for frame in levels[1].observations["frame"]:
+        blocks = observation["frame"].reshape(12, 2, 16, 2, 1).mean(axis=(1, 3), dtype=np.float32)
+        assert np.array_equal(frame, np.round(blocks))
+        observation, _, terminated, truncated, info = env.step(np.zeros(1, np.float32))
+    assert terminated or truncated
+    assert info["collision"] == levels[1].threat
+
+
+@pytest.mark.slow
+def test_number_of_processes_does_not_change_the_episodes(episodes):
+    recorder = DriveRecorder("LGMD/RandomBraking-v0", ARGUMENTS)
+    for expected, (found,) in zip(episodes, record_parallel(recorder.record, range(12), jobs=2), strict=True):
+        assert expected.time_to_brake.tobytes() == found.time_to_brake.tobytes()
+        for name, values in expected.observations.items():
+            assert values.tobytes() == found.observations[name].tobytes()
+
+
+@pytest.mark.parametrize("seeds", [range(0), range(2, 3)])
+def test_number_of_episodes_is_that_of_the_seeds(seeds):
+    assert len(DriveRecorder("LGMD/RandomBraking-v0", ARGUMENTS).record(seeds)) == len(seeds)
 
 
 def test_files(tmp_path, episodes):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 from stable_baselines3.common.monitor import load_results
-from support.recordings import offline_config, write_yaml
+from support.recordings import recorded_config, write_yaml
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.cli import main as cli
@@ -109,22 +109,8 @@ def test_the_best_evaluation_has_the_highest_mean_return(tmp_path):
     assert str(best_result(tmp_path)) == "2.00 +/- 1.00"
 
 
-def test_model_card_of_offline_training(tmp_path):
-    config = offline_config(tmp_path)
-    (tmp_path / "log").mkdir()
-    (tmp_path / "log" / "progress.csv").write_text(
-        "mean_return,avoided,best_return\n-1.0,0.1,1.5\n2.5,0.6,3.0\n2.8,0.5,3.0\n"
-    )
-    result = best_result(tmp_path)
-    assert (str(result), result.episodes) == ("2.50", None)
-    write_model_card(config, tmp_path, "0.1")
-    text = (tmp_path / "README.md").read_text()
-    assert "value: '2.50'" in text
-    assert "mean return 2.50 over all recorded episodes of `validation`" in text
-
-
 def test_model_card_without_an_evaluation(tmp_path):
-    write_model_card(offline_config(tmp_path), tmp_path, "0.1")
+    write_model_card(recorded_config(tmp_path), tmp_path, "0.1")
     text = (tmp_path / "README.md").read_text()
     assert "model-index" not in text
     assert "The training had no evaluation." in text

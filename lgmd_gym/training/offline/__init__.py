@@ -1,1 +1,1 @@
-"""Offline training: recorded episodes, datasets and the learner; independent of `TrainConfig`."""
+"""Training on recorded episodes: recorders, dataset and learner; independent of `TrainConfig`."""

@@ -1,6 +1,6 @@
 # pyright: standard
 # Not strict: torch and stable-baselines3 state few types.
-"""`OfflineDataset`: batches of recorded episodes in the form that a policy is trained on.
+"""`StateDataset`: the decisions of recorded episodes in the form that a policy is trained on.
 
 A level and its mirror image, left and right exchanged, have the same outcomes. Mirrored inputs are therefore
 further training data, of roads with traffic on the left.
@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 import torch
 
+from lgmd_gym.agents.base import HOLD
 from lgmd_gym.agents.policies.features import (
-    FRAME,
     NUM_LEVELS,
     ZONE_INPUTS,
     FeatureConfig,
@@ -31,7 +31,7 @@ from lgmd_gym.agents.sides import (
     NUM_SIDE_FIELDS,
     SIDE_COLUMNS,
 )
-from lgmd_gym.training.offline.episodes import Observation, RecordedEpisode
+from lgmd_gym.training.offline.episodes import DrivenEpisode, Observation
 
 EPISODES_AT_ONCE = 16  # whose inputs are computed together
 EVEN = ("ego_speed", "ego_acceleration", "known_deceleration", "zones", "zones_spikes", "zones_ffi")
@@ -40,109 +40,64 @@ EXCHANGED = ("columns", "sides_ffi")
 """Inputs of which the mirror image exchanges left and right."""
 
 
-class EpisodeBatch(NamedTuple):
-    """N episodes of at most T policy decisions, M decisions in total."""
-
-    inputs: dict[str, torch.Tensor]  # policy inputs by name, (M, ...) each, frames with channels first
-    indices: tuple[torch.Tensor, torch.Tensor]  # episode and decision of each row of `inputs`, (M,) each
-    # rewards of holding the speed, (N, T); this and the next three are 0 after the episode's end
-    rewards: torch.Tensor
-    braking_returns: torch.Tensor  # returns of braking, (N, T)
-    braking_contacts: torch.Tensor  # whether braking ends in a contact, bool (N, T)
-    mask: torch.Tensor  # 1 at the decisions of the episode, (N, T)
-    threats: torch.Tensor  # whether the episode without braking ends in a contact, bool (N,)
-
-
-class OfflineDataset:
-    """Recorded episodes with the inputs and the decision rate of a policy.
-
-    It contains the inputs at each decision of the policy, those in `ZONE_INPUTS` as float16. Observations are
-    not kept.
+class StateDataset:
+    """The decisions of driven episodes: the inputs of a policy, and the interval of the time to brake.
 
     Args:
-        episodes: Recorded episodes, at least one; they are processed in groups.
-        features: Inputs and timing of the policy.
+        episodes: Driven episodes, at least one; they are processed in groups.
+        features: Inputs and timing of the policy, without frames and history.
+        limits_s: Upper ends of the intervals of the time to brake [s].
 
     Attributes:
-        episodes: The episodes without their observations.
+        names: Names of the inputs, in the order of the network: sorted.
+        sizes: Number of features of each input.
+        features: Inputs side by side, float16, (M, features).
+        classes: Index of the interval, int64, (M,).
+        braking: Whether the agent braked before the decision, bool, (M,).
     """
 
-    def __init__(self, episodes: Iterable[RecordedEpisode], features: FeatureConfig) -> None:
-        self.episodes: list[RecordedEpisode] = []
-        self._features = features
-        self._inputs: list[dict[str, np.ndarray]] = []  # of each episode
+    def __init__(
+        self, episodes: Iterable[DrivenEpisode], features: FeatureConfig, limits_s: Sequence[float]
+    ) -> None:
+        self.names = sorted(features.inputs)
+        tables: list[np.ndarray] = []
+        times, demands = list[np.ndarray](), list[np.ndarray]()
+        self.sizes: list[int] = []
         remaining = iter(episodes)
         while group := list(islice(remaining, EPISODES_AT_ONCE)):
-            # Batches add the history. Stored here, it would multiply the memory by its length.
-            self._inputs += policy_inputs([episode.observations for episode in group], features)
-            self.episodes += [replace(episode, observations={}) for episode in group]
+            for inputs in policy_inputs([episode.observations for episode in group], features):
+                self.sizes = [inputs[name].shape[1] for name in self.names]
+                parts = [inputs[name].astype(np.float16) for name in self.names]
+                tables.append(np.concatenate(parts, axis=1))
+            times += [episode.time_to_brake[:: features.repeat] for episode in group]
+            before = [np.concatenate([[HOLD], episode.demands[:-1]]) for episode in group]
+            demands += [values[:: features.repeat] for values in before]
+        self.features = np.concatenate(tables)
+        self.classes = np.digitize(np.concatenate(times), limits_s)
+        self.braking = np.concatenate(demands) < HOLD
 
     def __len__(self) -> int:
-        return len(self.episodes)
+        return len(self.classes)
 
-    def batch(
-        self, indices: Sequence[int] | np.ndarray, mirrored: Sequence[bool] | np.ndarray = ()
-    ) -> EpisodeBatch:
-        """Return the episodes with these indices.
+    def batch(self, indices: np.ndarray, mirrored: np.ndarray | None = None) -> torch.Tensor:
+        """Return features, float32, (M, features).
 
         Args:
-            indices: Indices of N episodes.
-            mirrored: Whether each of them is mirrored, left to right, bool, (N,); empty for none.
-
-        Raises:
-            ValueError: If an episode is mirrored and an input has no known mirror image.
+            indices: Indices of M decisions.
+            mirrored: Whether each of them is mirrored, left to right, bool, (M,); None for none.
         """
-        repeat = self._features.repeat
-        episodes = [self.episodes[index] for index in indices]
-        lengths = np.array([-(-len(episode) // repeat) for episode in episodes])
-        rows = np.repeat(np.arange(len(episodes)), lengths)
-        columns = np.concatenate([np.arange(length) for length in lengths])
-        starts = (np.cumsum(lengths) - lengths)[rows]
+        values = self.features[indices]
+        if mirrored is not None:
+            start = 0
+            for name, size in zip(self.names, self.sizes, strict=True):
+                part = values[mirrored, start : start + size]
+                values[mirrored, start : start + size] = self.mirror(name, part)
+                start += size
+        return torch.from_numpy(values.astype(np.float32))
 
-        def padded(arrays: list[np.ndarray]) -> torch.Tensor:
-            table = np.zeros((len(episodes), lengths.max()), arrays[0].dtype)
-            table[rows, columns] = np.concatenate(arrays)
-            return torch.from_numpy(table)
-
-        return EpisodeBatch(
-            inputs={
-                name: self._with_history(name, self._arrays(name, indices, mirrored), columns, starts)
-                for name in self._features.inputs
-            },
-            indices=(torch.from_numpy(rows), torch.from_numpy(columns)),
-            rewards=padded([np.add.reduceat(item.rewards, range(0, len(item), repeat)) for item in episodes]),
-            braking_returns=padded([item.braking_returns[::repeat] for item in episodes]),
-            braking_contacts=padded([item.braking_contacts[::repeat] for item in episodes]),
-            mask=padded([np.ones(length, np.float32) for length in lengths]),
-            threats=torch.tensor([item.threat for item in episodes]),
-        )
-
-    def _arrays(
-        self, name: str, indices: Sequence[int] | np.ndarray, mirrored: Sequence[bool] | np.ndarray
-    ) -> list[np.ndarray]:
-        """Return an input of some episodes, (decisions, ...) each."""
-        arrays = [self._inputs[index][name] for index in indices]
-        if not len(mirrored):
-            return arrays
-        return [
-            mirror_input(name, array) if flag else array for array, flag in zip(arrays, mirrored, strict=True)
-        ]
-
-    def _with_history(
-        self, name: str, arrays: list[np.ndarray], columns: np.ndarray, starts: np.ndarray
-    ) -> torch.Tensor:
-        """Return an input with its history, oldest first; the first decision fills missing ones.
-
-        `columns` are the decisions of the rows, and `starts` the first rows of their episodes.
-        """
-        values = np.concatenate(arrays)
-        length = self._features.history_of(name)
-        if length > 1:
-            rows = [starts + np.maximum(columns - lag, 0) for lag in range(length - 1, -1, -1)]
-            values = np.concatenate([values[row] for row in rows], axis=-1)
-        if name == FRAME:
-            return torch.from_numpy(np.moveaxis(values, -1, 1).copy())
-        return torch.from_numpy(values).float()
+    def mirror(self, name: str, values: np.ndarray) -> np.ndarray:
+        """Return the mirror image of an input at some decisions, new array, (M, elements)."""
+        return mirror_input(name, values)
 
 
 def policy_inputs(

@@ -1,6 +1,6 @@
 # pyright: standard
 # Not strict: Gymnasium states few types.
-"""Recorders of episodes with random braking, and of the time to brake at each of their decisions.
+"""Recorder of levels with random braking, and of the time to brake at each of their decisions.
 
 A policy that releases the brake must know what a threat looks like while the car brakes, and after a release.
 So these episodes contain driving at constant demand, braking at any time, and driving after a release. The
@@ -23,13 +23,11 @@ from lgmd_gym.envs.forecast import ForecastParams
 from lgmd_gym.training.offline.episodes import (
     DrivenEpisode,
     Observation,
-    RecordedEpisode,
     select_signals,
     stack,
 )
-from lgmd_gym.training.offline.recorder import NUM_ENVS
-from lgmd_gym.training.offline.traffic import TrafficRecorder
 
+NUM_ENVS = 4  # environments with cameras; more are slower, because fewer tables fit in the cache
 STREAM = 911  # second part of the seed of a driver
 
 
@@ -78,7 +76,7 @@ class _Drive:
     """A running episode."""
 
     family: str
-    driver: PulseDriver
+    driver: PulseDriver | None  # None for holding the speed
     observations: list[Observation] = field(default_factory=list[Observation])
     times_to_brake: list[float] = field(default_factory=list[float])
     demands: list[float] = field(default_factory=list[float])
@@ -93,11 +91,12 @@ class _Drive:
 
 @dataclass(frozen=True)
 class DriveRecorder:
-    """Records episodes with random braking of an environment that the engine covers, one per seed."""
+    """Records episodes of an environment that the engine covers, one per seed, with random braking."""
 
     env_id: str  # id of braking environments
     arguments: Arguments  # arguments of `gym.make_vec`; `camera` is required
     shrink: int | None = None  # see `select_signals`
+    brakes: bool = True  # False for episodes that hold the speed
 
     def record(self, seeds: range) -> list[list[DrivenEpisode]]:
         """Return a list with one episode for each seed."""
@@ -132,14 +131,13 @@ class DriveRecorder:
                 observations, _ = envs.reset(seed=seeds, options={"reset_mask": mask})
                 for index, seed in enumerate(seeds):
                     if seed is not None:
-                        running[index] = drives[seed] = _Drive(
-                            envs.scenario_of(index).family, PulseDriver(seed)
-                        )
+                        driver = PulseDriver(seed) if self.brakes else None
+                        running[index] = drives[seed] = _Drive(envs.scenario_of(index).family, driver)
             active = np.zeros(envs.num_envs, np.bool_)
             for index, drive in running.items():
                 time_to_brake = float(forecasts["ttb"][index])
                 time = len(drive.demands) / FPS
-                demands[index] = drive.driver.act(time, time_to_brake)
+                demands[index] = HOLD if drive.driver is None else drive.driver.act(time, time_to_brake)
                 active[index] = True
                 row = {name: values[index] for name, values in observations.items()}
                 drive.observations.append(select_signals(row, self.shrink))
@@ -150,32 +148,3 @@ class DriveRecorder:
             outcome = simulation.outcome
             ended = outcome.terminated | outcome.truncated
             running = {index: drive for index, drive in running.items() if not ended[index]}
-
-
-def driven(episode: RecordedEpisode) -> DrivenEpisode:
-    """Return an episode without braking with the time to brake that follows from the outcomes of braking."""
-    count = len(episode)
-    times = np.full(count, inf, np.float32)
-    if episode.threat:
-        avoidable = np.flatnonzero(~episode.braking_contacts)
-        last = int(avoidable[-1]) if avoidable.size else 0
-        times[:] = np.maximum(last - np.arange(count), 0) / FPS
-    return DrivenEpisode(
-        episode.observations,
-        times,
-        np.zeros(count, np.float32),
-        episode.threat,
-        episode.traffic,
-        episode.family,
-    )
-
-
-@dataclass(frozen=True)
-class TrafficDriveRecorder:
-    """Records the segments of a `TrafficRecorder`, which contain no braking, with their time to brake."""
-
-    recorder: TrafficRecorder
-
-    def record(self, seeds: range) -> list[list[DrivenEpisode]]:
-        """Return the segments of one traffic episode for each seed."""
-        return [[driven(episode) for episode in segments] for segments in self.recorder.record(seeds)]

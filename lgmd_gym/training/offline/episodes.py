@@ -1,6 +1,6 @@
 # pyright: standard
 # Not strict: joblib states few types.
-"""Episodes without braking, with the outcome of braking at each of their decisions, and their files."""
+"""Recorded episodes with the time to brake at each of their decisions, and their files."""
 
 import json
 from collections.abc import Callable, Iterator, Sequence
@@ -23,14 +23,6 @@ SIGNALS = (*SCALES, "column_potential")  # recorded if present
 TRAFFIC = "traffic"  # `family` of episodes in traffic
 
 
-@dataclass(frozen=True, slots=True)
-class BrakingOutcome:
-    """Outcome of braking from one decision on."""
-
-    episode_return: float  # sum of the environment's rewards from that decision on
-    contact: bool  # whether the episode ends in a contact
-
-
 @dataclass(frozen=True)
 class DrivenEpisode:
     """One episode with random braking, of T environment decisions, for policies of any decision rate."""
@@ -49,32 +41,13 @@ class DrivenEpisode:
         return len(self.demands)
 
 
-@dataclass(frozen=True)
-class RecordedEpisode:
-    """One episode without braking, of T environment decisions, for policies of any decision rate."""
-
-    # observations by name, (T, ...) each; `frame` is shrunk and present on request only
-    observations: Observation
-    rewards: np.ndarray  # reward of holding the speed at each decision, float32 (T,)
-    braking_returns: np.ndarray  # return of braking from each decision on, float32 (T,)
-    braking_contacts: np.ndarray  # whether braking from each decision on ends in a contact, bool (T,)
-    threat: bool  # whether the episode without braking ends in a contact
-    traffic: bool = False  # whether the episode is a segment of a traffic episode
-    family: str = ""  # scenario family of the level; "traffic" in traffic, empty if unknown
-
-    def __len__(self) -> int:
-        return len(self.rewards)
-
-
-Recorded: TypeAlias = RecordedEpisode | DrivenEpisode
-"""An episode in the files of a training run."""
-RecordFunction: TypeAlias = Callable[[range], "list[list[RecordedEpisode]] | list[list[DrivenEpisode]]"]
+RecordFunction: TypeAlias = Callable[[range], list[list[DrivenEpisode]]]
 """Method `record` of a recorder: the episodes of each seed."""
 
 
 def record_parallel(
     record: RecordFunction, seeds: range, jobs: int = 1, chunk_size: int = CHUNK_SIZE
-) -> Iterator[Sequence[Recorded]]:
+) -> Iterator[list[DrivenEpisode]]:
     """Yield the episodes of each seed, recorded by several processes.
 
     Args:
@@ -90,7 +63,7 @@ def record_parallel(
         yield from by_seed
 
 
-def select_signals(observation: Observation, shrink: int | None) -> Observation:
+def select_signals(observation: Observation, shrink: int | None = None) -> Observation:
     """Return the recorded part of an observation.
 
     Args:
@@ -108,15 +81,11 @@ def stack(observations: list[Observation]) -> Observation:
     return {name: np.stack([item[name] for item in observations]) for name in observations[0]}
 
 
-PER_DECISION: dict[type[Recorded], tuple[str, ...]] = {
-    RecordedEpisode: ("rewards", "braking_returns", "braking_contacts"),
-    DrivenEpisode: ("time_to_brake", "demands"),
-}
-"""Arrays of each kind of episode."""
+PER_DECISION = ("time_to_brake", "demands")  # arrays of an episode, beside the observations
 PREFIX = "observations/"
 
 
-def save(by_seed: Sequence[Sequence[Recorded]], file: Path, origin: Values) -> None:
+def save(by_seed: Sequence[Sequence[DrivenEpisode]], file: Path, origin: Values) -> None:
     """Write episodes to a file; an interrupted write leaves no file.
 
     Args:
@@ -134,7 +103,7 @@ def save(by_seed: Sequence[Sequence[Recorded]], file: Path, origin: Values) -> N
         "families": np.array([episode.family for episode in episodes], str),
     }
     if episodes:
-        for name in PER_DECISION[type(episodes[0])]:
+        for name in PER_DECISION:
             arrays[name] = np.concatenate([getattr(episode, name) for episode in episodes])
         for name in episodes[0].observations:
             arrays[PREFIX + name] = np.concatenate([episode.observations[name] for episode in episodes])
@@ -147,8 +116,8 @@ def is_complete(file: Path) -> bool:
     return is_intact_zip(file, "origin.npy")
 
 
-def load(file: Path) -> list[list[Any]]:
-    """Return the episodes in a file, by seed: `RecordedEpisode` or `DrivenEpisode`.
+def load(file: Path) -> list[list[DrivenEpisode]]:
+    """Return the episodes in a file, by seed.
 
     Raises:
         ValueError: If the file contains no recorded episodes.
@@ -163,7 +132,7 @@ def check_file(file: Path, origin: Values) -> int:
 
     Args:
         file: File written by `save`.
-        origin: Required settings; a `shrink` of None accepts any.
+        origin: Required settings; the file may have others.
 
     Raises:
         ValueError: If the file contains no recorded episodes, or was recorded with other settings.
@@ -171,7 +140,7 @@ def check_file(file: Path, origin: Values) -> int:
     with _open(file) as archive:
         recorded = json.loads(str(archive["origin"]))
         for key, value in origin.items():
-            if recorded.get(key) != value and not (key == "shrink" and value is None):
+            if recorded.get(key) != value:
                 raise ValueError(
                     f"the episodes in {str(file)!r} were recorded with another {key} "
                     f"({', not '.join(map(_abbreviated, _difference(recorded.get(key), value)))}); "
@@ -212,20 +181,18 @@ def _open(file: Path) -> Any:
     return archive
 
 
-def _episodes(archive: Any) -> Iterator[Recorded]:
+def _episodes(archive: Any) -> Iterator[DrivenEpisode]:
     arrays = {name: archive[name] for name in archive.files if name not in ("origin", "counts")}
     observations = {
         name.removeprefix(PREFIX): array for name, array in arrays.items() if name.startswith(PREFIX)
     }
     bounds = np.cumsum([0, *arrays["lengths"]])
-    families = arrays.get("families", np.full(len(arrays["lengths"]), ""))  # format 6 and later
-    kind = next((kind for kind, names in PER_DECISION.items() if names[0] in arrays), RecordedEpisode)
     for index in range(len(arrays["lengths"])):
         part = slice(*bounds[index : index + 2])
-        yield kind(
+        yield DrivenEpisode(
             {name: array[part] for name, array in observations.items()},
-            *(arrays[name][part] for name in PER_DECISION[kind]),
+            *(arrays[name][part] for name in PER_DECISION),
             threat=bool(arrays["threats"][index]),
             traffic=bool(arrays["traffic"][index]),
-            family=str(families[index]),
+            family=str(arrays["families"][index]),
         )

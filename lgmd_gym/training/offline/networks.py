@@ -1,6 +1,6 @@
 # pyright: standard
 # Not strict: torch and stable-baselines3 state few types.
-"""Networks of `OfflineLearner`: models of stable-baselines3, their standardisation, and merged ensembles.
+"""Networks of `TimeToBrakeLearner`: models of stable-baselines3, their optimizers, and merged ensembles.
 
 Adam's steps are equally long for all weights, so that it learns faster from features of equal spread; the
 levels of columns have standard deviations of 0.08 to 0.65. After training the mean and the scale become part
@@ -29,20 +29,32 @@ def make_model(policy: str, env: "GymEnv", seed: int, policy_kwargs: Arguments) 
 
 
 def network_arguments(changes: Arguments) -> Arguments:
-    """Return the arguments of a network: the defaults of `OfflineLearner` with some changes."""
+    """Return the arguments of a network: the defaults of `TimeToBrakeLearner` with some changes."""
     return {"activation_fn": torch.nn.ReLU, "net_arch": {"pi": [64, 64], "vf": []}} | changes
 
 
-def extracts_features(network: Any) -> bool:
-    """Return whether a network computes its features with weights of its own, as from frames."""
-    return any(True for _ in network.features_extractor.parameters())
+class Optimizer(NamedTuple):
+    """Trained parameters of a network, their optimizer and the schedule of its learning rate."""
+
+    trained: list[torch.nn.Parameter]
+    optimizer: torch.optim.Optimizer
+    schedule: torch.optim.lr_scheduler.LRScheduler
+
+    def step(self, loss: torch.Tensor) -> None:
+        """Take one step down the gradient of a loss."""
+        self.optimizer.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(self.trained, 1.0)
+        self.optimizer.step()
+        self.schedule.step()
 
 
-def check_without_frames(network: Any, name: str, required: object) -> None:
-    """Raise ValueError for a network that processes frames, where a hyperparameter requires vectors."""
-    if extracts_features(network):
-        value = str(required).lower()
-        raise ValueError(f"{name} must be {value} for a policy on frames; set {name}: {value}")
+def make_optimizer(network: Any, learning_rate: float, weight_decay: float, steps: int) -> Optimizer:
+    """Return AdamW with a one-cycle schedule for the parameters of a network without its value function."""
+    trained = [value for name, value in network.named_parameters() if "value" not in name]
+    optimizer = torch.optim.AdamW(trained, learning_rate, weight_decay=weight_decay)
+    schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, learning_rate, total_steps=steps)
+    return Optimizer(trained, optimizer, schedule)
 
 
 def merged_layers(policy_kwargs: Arguments, count: int) -> Arguments:

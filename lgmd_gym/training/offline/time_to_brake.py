@@ -2,10 +2,9 @@
 # Not strict: torch and stable-baselines3 state few types.
 """`TimeToBrakeLearner`: a policy that estimates the time to brake at the decisions of driven episodes."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from functools import partial
-from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import gymnasium as gym
@@ -13,19 +12,17 @@ import numpy as np
 import torch
 from gymnasium import spaces
 
-from lgmd_gym.agents.base import HOLD
 from lgmd_gym.agents.policies.evidence import TimeToBrakeParams
-from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import check_flag, check_positive, check_whole, check_within
 from lgmd_gym.statistics.ranks import roc_area
-from lgmd_gym.training.offline.dataset import EPISODES_AT_ONCE, check_mirror, mirror_input, policy_inputs
-from lgmd_gym.training.offline.episodes import DrivenEpisode
-from lgmd_gym.training.offline.learner import SEED_STEP, Optimizer, make_optimizer
+from lgmd_gym.training.offline.dataset import StateDataset, check_mirror
 from lgmd_gym.training.offline.networks import (
+    Optimizer,
     Standardisation,
     linear_layers,
     make_model,
+    make_optimizer,
     measure,
     merge_networks,
     merged_layers,
@@ -35,64 +32,9 @@ from lgmd_gym.training.offline.networks import (
 if TYPE_CHECKING:
     from stable_baselines3 import PPO
 
+SEED_STEP = 1000  # between the seeds of the networks of an ensemble
 MEASURED_STATES = 100_000  # at most, for the standardisation of features
 EVALUATED_STATES = 4096  # at once
-
-
-class StateDataset:
-    """The decisions of driven episodes: the inputs of a policy, and the interval of the time to brake.
-
-    Args:
-        episodes: Driven episodes, at least one; they are processed in groups.
-        features: Inputs and timing of the policy, without frames and history.
-        limits_s: Upper ends of the intervals of the time to brake [s].
-
-    Attributes:
-        names: Names of the inputs, in the order of the network: sorted.
-        sizes: Number of features of each input.
-        features: Inputs side by side, float16, (M, features).
-        classes: Index of the interval, int64, (M,).
-        braking: Whether the agent braked before the decision, bool, (M,).
-    """
-
-    def __init__(
-        self, episodes: Iterable[DrivenEpisode], features: FeatureConfig, limits_s: Sequence[float]
-    ) -> None:
-        self.names = sorted(features.inputs)
-        tables: list[np.ndarray] = []
-        times, demands = list[np.ndarray](), list[np.ndarray]()
-        self.sizes: list[int] = []
-        remaining = iter(episodes)
-        while group := list(islice(remaining, EPISODES_AT_ONCE)):
-            for inputs in policy_inputs([episode.observations for episode in group], features):
-                self.sizes = [inputs[name].shape[1] for name in self.names]
-                parts = [inputs[name].astype(np.float16) for name in self.names]
-                tables.append(np.concatenate(parts, axis=1))
-            times += [episode.time_to_brake[:: features.repeat] for episode in group]
-            before = [np.concatenate([[HOLD], episode.demands[:-1]]) for episode in group]
-            demands += [values[:: features.repeat] for values in before]
-        self.features = np.concatenate(tables)
-        self.classes = np.digitize(np.concatenate(times), limits_s)
-        self.braking = np.concatenate(demands) < HOLD
-
-    def __len__(self) -> int:
-        return len(self.classes)
-
-    def batch(self, indices: np.ndarray, mirrored: np.ndarray | None = None) -> torch.Tensor:
-        """Return features, float32, (M, features).
-
-        Args:
-            indices: Indices of M decisions.
-            mirrored: Whether each of them is mirrored, left to right, bool, (M,); None for none.
-        """
-        values = self.features[indices]
-        if mirrored is not None:
-            start = 0
-            for name, size in zip(self.names, self.sizes, strict=True):
-                part = values[mirrored, start : start + size]
-                values[mirrored, start : start + size] = mirror_input(name, part)
-                start += size
-        return torch.from_numpy(values.astype(np.float32))
 
 
 class StateEvaluation(NamedTuple):

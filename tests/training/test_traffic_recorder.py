@@ -1,53 +1,26 @@
-"""Segments of traffic episodes: which are recorded, and the return of braking in them."""
+"""Segments of traffic episodes: which are recorded, and their time to brake."""
 
 from dataclasses import astuple
 from functools import partial
 
 import numpy as np
 import pytest
-from support.recordings import offline_config
 from support.traffic import BlockedHighway, EmptyHighway, Following, Recorded, Standing
 
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.traffic.emergencies import Emergencies
 from lgmd_gym.training.offline import traffic
-from lgmd_gym.training.offline.recorder import EpisodeRecorder
 from lgmd_gym.training.offline.traffic import (
     TrafficRecorder,
     brake_to_standstill,
-    non_threat_episode,
+    last_timely,
     run_episode,
     segment_bounds,
     threat_episode,
 )
 
 HIGHWAY, INTERSECTION = 0, 3  # seeds of these kinds of traffic
-
-
-@pytest.mark.parametrize(("env_id", "speed"), [("LGMD/EmptyRoad-v0", 12.0), ("LGMD/Following-v0", 20.0)])
-def test_computed_returns_equal_replays_in_braking_env(tmp_path, env_id, speed):
-    config = offline_config(tmp_path, env_id, env_kwargs={"ego_speed": speed, "world": "laboratory"})
-    ((replayed,),) = EpisodeRecorder(partial(config.make_env, "train"), hold=0, brake=1).record(range(1))
-    computed = non_threat_episode(replayed.observations, 30.0)
-    assert not replayed.threat
-    assert replayed.observations["ego_speed"] == pytest.approx(speed)
-    assert computed.rewards == pytest.approx(replayed.rewards, abs=1e-3)
-    # The jerk costs 0.05 at the start and 0.05 at the standstill and is neglected.
-    assert computed.braking_returns[:-30] == pytest.approx(replayed.braking_returns[:-30], abs=0.2)
-
-
-def test_braking_at_standstill_costs_nothing():
-    episode = non_threat_episode({"ego_speed": np.zeros((60, 1), np.float32)}, 30.0)
-    assert not episode.rewards.any()
-    assert not episode.braking_returns.any()
-
-
-def test_braking_near_the_end_costs_the_remaining_time():
-    episode = non_threat_episode({"ego_speed": np.full((60, 1), 20.0, np.float32)}, 30.0)
-    assert episode.braking_returns[-1] == pytest.approx(episode.rewards[-1])  # within the brake's dead time
-    # With 1 s left: 0.233 s dead time and build-up, 0.767 s at 9 m/s², which cost 2 per second, over 17.36 m.
-    assert episode.braking_returns[-30] == pytest.approx(17.355 / 20.0 - 2.0 * 0.7667, abs=1e-3)
 
 
 def test_long_stretches_are_divided_evenly():
@@ -72,6 +45,7 @@ def test_segments_exclude_the_ten_seconds_before_an_emergency(monkeypatch, emerg
     observations = [{"ego_speed": np.array([decision / 30.0], np.float32)} for decision in range(900)]
     monkeypatch.setattr(traffic, "run_episode", lambda *_: (observations, emergencies))
     (segments,) = TrafficRecorder("train", "fovea").record(range(1))
+    assert all(np.isinf(segment.time_to_brake).all() and not segment.threat for segment in segments)
     times = [segment.observations["ego_speed"][:, 0] for segment in segments]
     assert [float(part[0]) for part in times] == pytest.approx(expected_starts, abs=0.01)
     for time in np.concatenate(times):
@@ -125,32 +99,31 @@ def observations_of(env, seed=0):
     while not done:
         found.append({"ego_speed": np.array([info["ego_speed"]], np.float32)})
         info, done = env.advance()
-    return found, info
+    return found
 
 
-def test_segment_before_a_contact_has_the_outcome_of_braking():
+def test_segment_before_a_contact_has_its_time_to_brake():
     """The contact is after 4.57 s; full braking avoids it up to 3.3 s."""
-    observations, info = observations_of(Following())
+    observations = observations_of(Following())
     episode = threat_episode(Following(), 0, observations)
-    assert (episode.threat, episode.traffic, len(episode)) == (True, True, len(observations) == 137 and 137)
-    first_late = int(np.argmax(episode.braking_contacts))
-    assert 96 <= first_late <= 102
-    assert episode.braking_contacts[first_late:].all()
-    speed = episode.observations["ego_speed"][:, 0].astype(float)
-    impact = info["relative_impact_speed"] / speed.max()
-    assert episode.rewards[:-1] == pytest.approx(speed[:-1] / speed.max() / 30.0, abs=1e-6)
-    assert episode.rewards[-1] == pytest.approx(
-        speed[-1] / speed.max() / 30.0 - 10.0 - 10.0 * impact**2, abs=1e-5
-    )
-    assert episode.braking_returns[first_late - 1] > -1.0
-    assert episode.braking_returns[first_late] < -9.0
+    assert (episode.threat, episode.traffic, len(episode)) == (True, True, 137)
+    assert not episode.demands.any()
+    last = int(np.argmax(episode.time_to_brake == 0.0))
+    assert 95 <= last <= 101
+    assert episode.time_to_brake == pytest.approx(np.maximum(last - np.arange(137), 0) / 30.0)
+    for decision, avoided in ((last, True), (last + 1, False)):
+        env = Following()
+        env.reset(seed=0)
+        for _ in range(decision):
+            env.advance()
+        assert brake_to_standstill(env) is avoided
 
 
 def test_segment_before_a_contact_is_at_most_ten_seconds_long():
     class Late(Following):
         glances, brakings = ((9.0, 13.0),), ((9.5, 12.5, 8.0),)
 
-    observations, _ = observations_of(Late())
+    observations = observations_of(Late())
     assert len(observations) > 310
     episode = threat_episode(Late(), 0, observations)
     assert len(episode) == 300
@@ -161,9 +134,9 @@ def test_contacts_that_no_braking_avoids_are_left_out():
     class Close(BlockedHighway):
         stationary_car_at = 14.0
 
-    observations, _ = observations_of(Close())
+    observations = observations_of(Close())
     assert threat_episode(Close(), 0, observations) is None
-    observations, _ = observations_of(Standing())
+    observations = observations_of(Standing())
     assert threat_episode(Standing(), 0, observations) is None
 
 
@@ -177,20 +150,33 @@ def test_a_contact_after_the_end_of_the_drive_is_no_threat(monkeypatch, contact,
 
 
 def test_a_twin_that_does_not_repeat_the_contact_is_rejected():
-    observations, _ = observations_of(Following())
+    observations = observations_of(Following())
     with pytest.raises(RuntimeError, match="does not repeat its contact at decision 137"):
         threat_episode(EmptyHighway(), 0, observations)
 
 
-def test_return_of_a_stop_on_an_empty_road():
-    """Distance over the top speed, minus the full cost of braking: 2 per second, build-up in proportion."""
+@pytest.mark.parametrize("last", [None, 0, 3, 5, 6, 17, 18, 37, 58, 59])
+def test_the_last_decision_in_time_is_found_with_few_replays(last):
+    replayed = []
+
+    def avoids(onset):
+        replayed.append(onset)
+        return last is not None and onset <= last
+
+    assert last_timely(60, avoids) == last
+    assert len(replayed) == len(set(replayed)) <= 11 + 3
+
+
+def test_the_only_decision():
+    assert last_timely(1, lambda onset: True) == 0
+    assert last_timely(1, lambda onset: False) is None
+
+
+def test_a_stop_on_an_empty_road_avoids_a_contact():
     env = EmptyHighway()
     env.reset(seed=0)
-    speed = float(env.ego.speed)
-    outcome = brake_to_standstill(env, speed)
-    distance, duration = 0.233 * speed + speed**2 / 18.0, speed / 9.0
-    assert not outcome.contact
-    assert outcome.episode_return == pytest.approx(distance / speed - 2.0 * duration, abs=0.08)
+    assert brake_to_standstill(env)
+    assert env.ego.speed == 0.0
 
 
 def test_kinds_with_drivers_who_err_add_segments_before_contacts(monkeypatch):

@@ -1,4 +1,4 @@
-"""Offline training with the command, from recording to the policy file."""
+"""Training on recorded episodes with the command, from recording to the policy file."""
 
 import csv
 import json
@@ -7,20 +7,22 @@ from functools import partial
 
 import gymnasium as gym
 import pytest
-from support.recordings import OFFLINE_YAML, offline_config, write_yaml
+from support.recordings import recorded_config, write_yaml
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.card import read_card
 from lgmd_gym.cli import main as cli
 from lgmd_gym.processes.files import FolderLock
 from lgmd_gym.training.offline import traffic
+from lgmd_gym.training.offline.driving import DriveRecorder
 from lgmd_gym.training.offline.episodes import load
-from lgmd_gym.training.offline.recorder import LevelRecorder
 from lgmd_gym.training.recordings import load_or_record
+
+LOSSES = ("train_loss", "loss", "best_loss")
 
 
 def arguments(folder, out, *options):
-    common = ["train", "--algo", "offline", "--camera", "fovea", "--jobs", "1"]
+    common = ["train", "--algo", "time-to-brake", "--camera", "fovea", "--jobs", "1"]
     return [*common, "--hyperparams", str(write_yaml(folder)), "--out", str(out), *options]
 
 
@@ -28,19 +30,17 @@ def arguments(folder, out, *options):
 def test_second_training_reuses_the_recordings_of_the_first(tmp_path, monkeypatch):
     first, second = tmp_path / "first", tmp_path / "second"
     assert cli.run(arguments(tmp_path, first, "--eval-episodes", "4")) == 0
-    monkeypatch.setattr(LevelRecorder, "record", None)  # any recording raises
+    monkeypatch.setattr(DriveRecorder, "record", None)  # any recording raises
     options = ["--eval-episodes", "3", "--n-timesteps", "5", "--inputs", "ffi", "ego_speed"]
     command = arguments(tmp_path, second, *options, "--recordings", str(first))
-    write_yaml(tmp_path, OFFLINE_YAML + "  select_margin: true\n")
     assert cli.run(command) == 0
     assert not (second / "episodes").exists()
     rows = [*csv.DictReader((second / "log" / "progress.csv").open())]
-    best = max(rows, key=lambda row: float(row["weighted_return"]))
-    assert best["best_return"] == best["weighted_return"] == rows[-1]["best_return"]
-    assert f"mean return {float(best['mean_return']):.2f}" in (second / "README.md").read_text()
+    assert rows[-1]["best_loss"] == min((row["loss"] for row in rows), key=float)
+    assert "The training had no evaluation." in (second / "README.md").read_text()
     card = read_card(second / "policy.zip")
     assert card["algo"] == "ppo"
-    assert card["config"]["algo"] == "offline"
+    assert card["config"]["algo"] == "time-to-brake"
     assert card["config"]["recordings"] is None  # no local path in a policy file
     agent = make_agent(f"policy:{second / 'policy.zip'}")
     observation, info = gym.make("LGMD/CCRs-v0", camera=agent.camera).reset(seed=0)
@@ -49,7 +49,7 @@ def test_second_training_reuses_the_recordings_of_the_first(tmp_path, monkeypatc
 
 
 def test_second_process_in_a_training_folder_is_refused(tmp_path, capsys):
-    (tmp_path / "config.json").write_text(json.dumps(offline_config(tmp_path).to_dict()))
+    (tmp_path / "config.json").write_text(json.dumps(recorded_config(tmp_path).to_dict()))
     lock = FolderLock(tmp_path)
     assert cli.run(["train", "--resume", str(tmp_path)]) == 2
     assert f"training folder {str(tmp_path)!r} is in use by process {os.getpid()};" in capsys.readouterr().err
@@ -73,15 +73,14 @@ def test_training_with_traffic_and_reuse_of_its_recordings(tmp_path, monkeypatch
     monkeypatch.setattr(traffic.TrafficRecorder, "record", None)  # any recording raises
     assert cli.run(arguments(tmp_path, second, *options, "1", "--recordings", str(first))) == 0
     columns = (second / "log" / "progress.csv").read_text().splitlines()[0].split(",")
-    expected = {"train_return", "mean_return", "avoided", "false_activations", "traffic_activations"}
-    assert set(columns) == expected | {"weighted_return", "margin", "best_return"}
-    config = offline_config(tmp_path, n_timesteps=3, traffic_episodes=1, recordings=str(first))
+    assert {*LOSSES} <= set(columns) <= {*LOSSES, "area", "area_braking"}
+    config = recorded_config(tmp_path, n_timesteps=3, traffic_episodes=1, recordings=str(first))
     assert len([*load_or_record(config, "train", tmp_path)]) == 3 + len(by_seed[0])
 
 
 @pytest.mark.slow
 def test_policy_with_fields_at_the_sides(tmp_path):
-    options = ["--sensors-of", "all-round", "--inputs", "columns", "sides", "sides_ffi", "ego_speed"]
+    options = ["--sensors-of", "all-round", "--inputs", "columns", "sides_ffi", "ego_speed"]
     command = arguments(tmp_path, tmp_path / "run", *options, "--eval-episodes", "4")
     command.remove("--camera")
     command.remove("fovea")
@@ -89,9 +88,9 @@ def test_policy_with_fields_at_the_sides(tmp_path):
     agent = make_agent(f"policy:{tmp_path / 'run' / 'policy.zip'}")
     env = gym.make("LGMD/CPNA-v0", ego_speed=8.0, camera=agent.camera)
     observation, info = env.reset(seed=0)
-    assert observation["membrane_potential"].shape == (35,)
-    assert observation["column_potential"].shape == (260,)
+    assert observation["membrane_potential"].shape == (31,)
+    assert observation["column_potential"].shape == (250,)
     agent.reset(0)
     for _ in range(10):
         observation, _, _, _, info = env.step(agent.act(observation, info))
-    assert observation["membrane_potential"][23:29].min() < 0.5  # motion to the left
+    assert observation["membrane_potential"][19:25].min() < 0.5  # motion to the left
