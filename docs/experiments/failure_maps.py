@@ -1,6 +1,6 @@
 """Maps of what breaks first: the share of avoided contacts over two quantities at a time, per agent.
 
-    python docs/experiments/failure_maps.py --agents stopping-zone policy:zones --worlds 8 --jobs 2 \
+    python docs/experiments/failure_maps.py --agents stopping-zone policy:all-round --worlds 8 --jobs 2 \
         --to docs/failure_maps.png
 
 Each cell of a map is one approach to a standing target, played once per test world in the condition and with
@@ -302,7 +302,7 @@ def read_options(arguments: Sequence[str] | None) -> argparse.Namespace:
     """Return the options of the command line."""
     first = SPLIT_WORLDS["test"].start
     parser = argparse.ArgumentParser(description="Maps of avoided contacts")
-    parser.add_argument("--agents", nargs="+", default=["stopping-zone", "policy:zones"])
+    parser.add_argument("--agents", nargs="+", default=["stopping-zone", "policy:all-round"])
     parser.add_argument("--bound", default="ttc-oracle", help="agent that uses no camera")
     parser.add_argument("--worlds", type=int, default=8, help="number of worlds, the sample of each cell")
     parser.add_argument("--first-world", type=int, default=first)

@@ -18,7 +18,7 @@ import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym.agents.base import FPS
 from lgmd_gym.agents.sides import side_cameras
 
-FAMILY, SEED, FIELD = "CCFtap", 6, "middle_right_lgmd"
+FAMILY, SEED, FIELD = "CCFtap", 6, "middle_right_dsn"
 TIMES = (1.6, 1.3, 1.0, 0.7)  # before the contact [s]
 BRIGHTEST = 60.0  # |P| that is drawn white [grey levels]
 

@@ -1,4 +1,4 @@
-"""Training of policies with stable-baselines3 or offline on recorded episodes."""
+"""Training of policies with stable-baselines3, online or on recorded episodes."""
 
 from lgmd_gym.training.config import TrainConfig
 from lgmd_gym.training.policy_env import PolicyWrapper
