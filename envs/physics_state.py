@@ -36,8 +36,6 @@ EGO_HEIGHT = 1.5  # [m]
 SHADES = (30, 220)  # range of random grey levels
 START_RANGE = 500.0  # [m], range of the random start position, which varies the road texture
 
-_SAVED = ("bodies", "episodes", "egos", "lines", "pending", "segments", "paths")  # without scratch memory
-
 
 class Placement(NamedTuple):
     """A scenario placed on the road, ready to be loaded into a `PhysicsState`.
@@ -165,26 +163,6 @@ class PhysicsState:
         episodes["impact_speed"][index] = episodes["relative_impact_speed"][index] = np.inf
         episodes["duration"][index], episodes["top_speed"][index] = scenario.duration, scenario.top_speed
         episodes["last_speed"][index] = scenario.ego_speed
-        return grown
-
-    def save(self, index: int) -> dict[str, np.ndarray]:
-        """Return a copy of the state of an environment, for `restore`."""
-        return {name: getattr(self, name)[index].copy() for name in _SAVED}
-
-    def restore(self, index: int, saved: dict[str, np.ndarray]) -> bool:
-        """Set the state of an environment to one that `save` of this or another `PhysicsState` returned.
-
-        Returns:
-            Whether arrays were replaced by larger ones.
-        """
-        bodies, pending = len(saved["bodies"]), len(saved["pending"])
-        rows = {name: len(saved[name]) for name in ("bodies", "pending", "segments", "paths")}
-        grown = self._reserve(before=bodies + 1, parts=pending + 1, **rows)
-        for name, value in saved.items():
-            if name in rows:
-                getattr(self, name)[index, : rows[name]] = value
-            else:
-                getattr(self, name)[index] = value
         return grown
 
     def _reserve(self, **needed: int) -> bool:

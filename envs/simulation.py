@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -78,13 +78,6 @@ class Rates:
     def steps(self) -> int:
         """Simulation steps per decision."""
         return int(self.simulation // self.policy)
-
-
-class Snapshot(NamedTuple):
-    """State of an episode between two decisions, without its cameras and neurons."""
-
-    state: dict[str, np.ndarray]  # see `PhysicsState.save`
-    brake: np.ndarray  # `BRAKE` record
 
 
 class Simulation:
@@ -248,24 +241,6 @@ class Simulation:
     def times(self) -> np.ndarray:
         """Simulated times since the reset, float64, shape (N,) [s]."""
         return self.state.episodes["steps"] / self.rates.simulation
-
-    def save(self, index: int) -> Snapshot:
-        """Return the state of environment `index`."""
-        return Snapshot(self.state.save(index), self.brakes[index].copy())
-
-    def restore(self, index: int, snapshot: Snapshot) -> None:
-        """Set the state of environment `index`.
-
-        Args:
-            index: Index of the environment.
-            snapshot: State from `save` of this simulation, or of another one with the same rates and weights.
-        """
-        if self.state.restore(index, snapshot.state):
-            self._link()
-        self.brakes[index] = snapshot.brake
-        if self.forecasts is not None:
-            self.forecasts["begun"][index] = UNKNOWN
-            self._forecast_part(index, index + 1, np.ones(self.num_envs, np.bool_))
 
     def _run(self, part: Callable[..., None], *arguments: object) -> None:
         if self._threads.count == 1:

@@ -96,16 +96,6 @@ def test_a_lead_car_is_known_to_brake_once_it_has_begun():
     assert info["ttb"] == pytest.approx(known_info["ttb"])
 
 
-def test_a_restored_state_has_its_own_time_to_brake():
-    made = make_scenario("CCRs", ego_speed=10.0)
-    env, info = forecasting(made)
-    other, _ = forecasting(make_scenario("CCRs", ego_speed=20.0))
-    for _ in range(15):
-        *_, info = env.step(np.zeros(1, np.float32))
-    other.simulation.restore(0, env.simulation.save(0))
-    assert other.simulation.forecasts["ttb"][0] == info["ttb"]
-
-
 def test_an_unavoidable_contact_requires_braking_at_once():
     standing = Actor(gap=10.0)
     made = Scenario(family="x", ego_speed=20.0, duration=9.0, actors=(standing,))
