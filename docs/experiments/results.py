@@ -13,8 +13,9 @@ with `--print`, it prints tables instead. `pages` fills every block
     <!-- end of table -->
 
 of the pages in Markdown from the CSV files: KIND is `avoided`, `false`, `detected` or `warned` with suites as
-arguments and a line per agent, `cases` with one suite and a line per case or family, or `traffic`. The
-arguments after `:` are agents, all of them by default. Intervals are at 95 % and cluster by case and world.
+arguments and a line per agent, `cases` with suites and a line per case or family, `traffic`, or `summary` for
+the agents of `IDEAS`. The arguments after `:` are agents, all of them by default. Intervals are at 95 % and
+cluster by case and world.
 """
 
 import argparse
@@ -42,9 +43,10 @@ from lgmd_gym.statistics.intervals import Rate
 
 DOCS = Path(__file__).parents[1]
 SCORES, TRAFFIC = DOCS / "results" / "scores.csv", DOCS / "results" / "traffic.csv"
+BOUND = "last-moment-oracle"  # the engine forecasts no traffic
 AGENTS = (
     *("no-brake", "spike-threshold", "spike-threshold:threshold=158,frames=3", "danger-zone"),
-    *("stopping-zone", "policy:all-round", "ttc-oracle", "last-moment-oracle"),
+    *("stopping-zone", "policy:all-round", "ttc-oracle", BOUND),
 )
 SEEDS = {
     "levels": 1,
@@ -67,6 +69,21 @@ SEEDS = {
 FIRST_TRAFFIC_SEED = 110
 BY_CASE = ("r152", "r152-vru")  # stated per case, since the regulation requires each of them
 ALL = "all"
+IDEAS = {
+    "spike-threshold": ("the paper's rule: brake at 30 spikes/s", "one LGMD, a fixed 10° camera"),
+    "stopping-zone": ("fields that follow the stopping distance", "17 LGMDs, speed, yaw rate"),
+    "policy:all-round": ("a network that estimates the time to brake", "31 fields, speed, motion, brake"),
+    BOUND: ("the bound: brakes at the last moment", "the true scene"),
+}
+"""Idea of an agent, and what it reads."""
+SUMMARY = {
+    "cars avoided": ("ncap2023", "avoided"),
+    "pedestrians, bicycles avoided": ("ncap2023-vru", "avoided"),
+    "everyday threats avoided": ("everyday-threats", "avoided"),
+    "brakes without a threat": ("false-reaction", "false"),
+}
+"""Suite and measure of each column of the summary."""
+KINDS = ("avoided", "false", "detected", "warned", "cases", "traffic", "summary")
 BLOCK = re.compile(r"(<!-- table: (\w+)([^>]*?) -->\n).*?(<!-- end of table -->)", re.DOTALL)
 
 
@@ -98,8 +115,12 @@ class Drives(NamedTuple):
 
 def config_of(name: str, agents: Sequence[str]) -> RunConfig:
     """Return the run of a suite in the test worlds 8,000 to 8,019, or more of them in traffic."""
-    suite = str(Path(__file__).with_name("levels.toml")) if name == "levels" else name
-    more: dict[str, Any] = {"first_seed": FIRST_TRAFFIC_SEED, "worlds": 1000} if "traffic" in name else {}
+    suite, more = name, dict[str, Any]()
+    if name == "levels":
+        suite = str(Path(__file__).with_name("levels.toml"))
+    if is_traffic(name):
+        more = {"first_seed": FIRST_TRAFFIC_SEED, "worlds": 1000}
+        agents = [agent for agent in agents if agent != BOUND]
     return RunConfig(suite=suite, agents=tuple(agents), seeds=SEEDS[name], conditions=("mixed",), **more)
 
 
@@ -271,7 +292,9 @@ def table(
     suites, agents = list(arguments[:split]), list(arguments[split + 1 :])
     if kind == "traffic":
         return traffic_table([item for item in drives if not agents or item.agent in agents])
-    check_known("kind of table", kind, ("avoided", "false", "detected", "warned", "cases", "traffic"))
+    if kind == "summary":
+        return summary_table(scores, drives)
+    check_known("kind of table", kind, KINDS)
     known = list(dict.fromkeys(score.agent for score in scores))
     for name in agents:
         check_known("agent of the results", name, known)
@@ -292,6 +315,19 @@ def table(
 
 def _keys(suite: str, group: str, agent: str) -> Iterator[tuple[str, str, str, str]]:
     return ((suite, group, agent, measure) for measure in ("avoided", "false"))
+
+
+def summary_table(scores: Sequence[Score], drives: Sequence[Drives]) -> list[str]:
+    """Return the table of the start page."""
+    rates = {(score.agent, score.suite, score.measure): score.rate for score in scores if score.group == ALL}
+    needless = {item.agent: item for item in drives if item.suite == "traffic"}
+    lines = [["agent", "idea", *SUMMARY, "needless brakes per 1,000 km of traffic", "reads"]]
+    for agent, (idea, reads) in IDEAS.items():
+        cells = [f"{rate.k} of {rate.n}" for rate in (rates[agent, *column] for column in SUMMARY.values())]
+        drive = needless.get(agent)
+        rate = f"{1000 * drive.needless / drive.km:.0f}" if drive else "–"
+        lines.append([f"`{agent}`", idea, *cells, rate, reads])
+    return markdown(lines)
 
 
 def traffic_table(drives: Sequence[Drives]) -> list[str]:

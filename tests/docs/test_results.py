@@ -90,6 +90,22 @@ def test_blocks_are_filled_and_the_rest_of_a_page_stays(script):
         script.filled(text.format("avoided r152 : b"), make)
 
 
+def test_the_table_of_the_start_page_has_a_line_per_idea(script):
+    rate = script.Rate(3, 4, 0.3, 0.95)
+    scores = [
+        script.Score(suite, "all", agent, measure, rate)
+        for agent in script.IDEAS
+        for suite, measure in script.SUMMARY.values()
+    ]
+    drives = [script.Drives("traffic", "stopping-zone", 200.0, 4, 5.5, 51.2, 30.0, 4, 3, 2, 1)]
+    heads, _, *lines = script.table("summary", [], scores, drives)
+    assert len(lines) == len(script.IDEAS)
+    assert len({line.count("|") for line in (heads, *lines)}) == 1
+    assert lines[1].startswith("| `stopping-zone` | fields that follow the stopping distance | 3 of 4 |")
+    assert " | 20 | 17 LGMDs" in lines[1]
+    assert " | – | " in lines[0]
+
+
 def test_files_keep_the_scores(script, tmp_path, monkeypatch):
     monkeypatch.setattr(script, "SCORES", tmp_path / "results" / "scores.csv")
     monkeypatch.setattr(script, "TRAFFIC", tmp_path / "results" / "traffic.csv")
