@@ -140,10 +140,7 @@ def test_links_on_the_forge_resolve():
         for target in re.findall(r"\]\(([^)\s]+)\)", text):
             file, _, heading = target.partition("#")
             found = path.parent / file if file else path
-            if target.startswith(("http", "mailto:")) or (path.stem, found.stem) == (
-                "training",
-                "BrakingEnv",
-            ):
+            if target.startswith(("http", "mailto:")):
                 continue
             if not found.exists() or "_generated" in file or (heading and heading not in headings(found)):
                 dead.append(f"{path.relative_to(ROOT)}: {target}")
