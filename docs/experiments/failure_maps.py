@@ -1,7 +1,7 @@
 """Maps of what breaks first: the share of avoided contacts over two quantities at a time, per agent.
 
     python docs/experiments/failure_maps.py --agents stopping-zone policy:all-round --worlds 8 --jobs 2 \
-        --to docs/failure_maps.png
+        --to failure_maps.png
 
 Each cell of a map is one approach to a standing target, played once per test world in the condition and with
 the brake of that world. A run counts as avoided if it has neither contact nor premature braking. Five planes,

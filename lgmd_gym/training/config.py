@@ -197,8 +197,8 @@ class TrainConfig(Record):
             file: YAML file in rl-zoo's format; None for the file of this package.
             inputs: Inputs of the policy in place of those in the file.
             sensors_of: Name of an agent whose cameras are used, such as "stopping-zone"; or "all-round" for
-                those of "stopping-zone" and fields at the sides. None for the option `camera`, or the cameras
-                that the inputs require.
+                the fields ahead and at the sides of `policy:all-round`. None for the option `camera`, or the
+                cameras that the inputs require.
             **options: Attributes of `TrainConfig` that replace those in the file; None keeps the default.
 
         Raises:

@@ -44,8 +44,9 @@ EXCLUDED = (
 def train(config: TrainConfig, folder: Path, *, progress: bool = False, jobs: int = 1) -> Path:
     """Train a policy in a new folder, as `lgmd-gym train` does.
 
-    The folder gets the configuration, logs, checkpoints or recorded episodes, policy.zip with the model that
-    has the best mean return on the validation split, and README.md, its model card for the Hugging Face Hub.
+    The folder gets the configuration, logs, checkpoints or recorded episodes, policy.zip with the best model
+    on the validation split, and README.md, its model card for the Hugging Face Hub. The best model has the
+    highest mean return, or, on recorded episodes, the lowest loss.
 
     Args:
         config: Configuration of the training.

@@ -50,6 +50,13 @@ def test_scores_by_family_with_those_that_are_due_to_the_target(script):
     }
 
 
+def test_a_failed_episode_without_the_target_is_no_detection(script):
+    run, twin = (stored(suite, {"CCRs/v20": True}) for suite in ("ncap2023", "ncap2023-without-target"))
+    twin.rows[0] |= {"false_activation": None, "error": "ValueError"}
+    scores = found(script, {"ncap2023": run, "ncap2023-without-target": twin})
+    assert scores["ncap2023", "all", "a", "detected"] == (0, 1)
+
+
 def test_scores_of_the_regulation_are_stated_per_case(script):
     scores = found(script, {"r152": stored("r152", {"CCRs/v20": True, "CCRs/v40": False})})
     assert scores["r152", "CCRs/v20", "a", "avoided"] == (1, 1)

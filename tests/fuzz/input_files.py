@@ -311,7 +311,7 @@ def cards(rng, folder):
     def check():
         path = folder / "inner" / "policy.zip"
         path.parent.mkdir(exist_ok=True)
-        with zipfile.ZipFile(SHIPPED / "zones.zip") as source, zipfile.ZipFile(path, "w") as target:
+        with zipfile.ZipFile(SHIPPED / "all-round.zip") as source, zipfile.ZipFile(path, "w") as target:
             for name in source.namelist():
                 data = source.read(name)
                 if name == CARD:
