@@ -1,9 +1,10 @@
-"""Cases of the Euro NCAP suites beside the cells of OpenSCENARIO files, by family.
+"""Cases of the Euro NCAP suites by family, also beside the cells of OpenSCENARIO files.
 
-    python docs/experiments/protocol_counts.py FOLDER
+    python docs/experiments/protocol_counts.py [FOLDER]
 
 FOLDER contains the Euro NCAP scenarios of Vector Informatik, `OSC-NCAP-scenarios/OpenSCENARIO/NCAP`. The
-files that vary all parameters of a test are counted, not those of single cells. The table is in Markdown.
+files that vary all parameters of a test are counted, not those of single cells. Without it, the table has the
+cases of the suites alone. It is in Markdown.
 """
 
 import re
@@ -35,6 +36,17 @@ def counts(cases: Iterable[Case]) -> Counter[str]:
     )
 
 
+def case_table() -> list[str]:
+    """Return the lines of the table without cells of files."""
+    columns = {suite: counts(SUITES[suite].cases) for suite in FILES}
+    families = sorted({family for counter in columns.values() for family in counter})
+    heads = " | ".join(f"`{suite}`" for suite in columns)
+    lines = [f"| family | {heads} |", f"|---|{'---:|' * len(columns)}"]
+    for family in families:
+        lines.append(f"| {family} | {' | '.join(str(item[family] or '') for item in columns.values())} |")
+    return [*lines, f"| **all** | {' | '.join(str(item.total()) for item in columns.values())} |"]
+
+
 def table(folder: Path) -> list[str]:
     """Return the lines of the table: cases of the suite / cells of the files."""
     columns: dict[str, tuple[Counter[str], Counter[str]]] = {}
@@ -54,9 +66,9 @@ def table(folder: Path) -> list[str]:
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
+    if len(sys.argv) > 2:
         sys.exit(__doc__)
     try:
-        print(*table(Path(sys.argv[1])), sep="\n")
+        print(*(table(Path(sys.argv[1])) if len(sys.argv) > 1 else case_table()), sep="\n")
     except ValueError as error:
         sys.exit(str(error))

@@ -186,6 +186,12 @@ def test_paths_on_the_page_about_the_architecture_exist():
     assert [path for path in paths if not (ROOT / path).exists()] == []
 
 
+def test_the_page_on_protocols_counts_the_cases_of_its_suites():
+    rows = re.findall(r"^\| `([\w-]+)` \| .* \| (\d+) \|$", (DOCS / "protocols.md").read_text(), re.MULTILINE)
+    assert len(rows) == 16
+    assert [(name, int(count)) for name, count in rows if len(SUITES[name].cases) != int(count)] == []
+
+
 def test_every_experiment_is_on_the_list():
     text = (DOCS / "experiments" / "README.md").read_text()
     found = {path.relative_to(DOCS / "experiments").parts[0] for path in (DOCS / "experiments").rglob("*.py")}

@@ -142,6 +142,7 @@ def test_protocol_counts(tmp_path, monkeypatch):
     families = ("CPNA-25", "CPTAfs", "CPRA_Cm", "CCRs")
     cells = tuple(Case("x", family, "v10", fcw_driver=family == "CCRs") for family in families)
     monkeypatch.setattr(script, "read", lambda path: Suite(name="x", cases=cells, about=""))
+    assert "\n".join(script.case_table()) in (EXPERIMENTS.parent / "protocols.md").read_text()
     lines = script.table(tmp_path)
     assert lines[0] == "| family | ncap2023 | ncap2023-vru | ncap2026 | ncap2026-extended |"
     assert "| CPNA | 0 / 1 | 22 / 1 | 36 / 1 | 24 / 1 |" in lines
