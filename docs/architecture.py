@@ -18,7 +18,7 @@ FONT = "font-family='system-ui, sans-serif'"
 SUBJECTS = {
     "cli": "the command lgmd-gym",
     "report": "HTML page of a run, gallery",
-    "training": "stable-baselines3, offline",
+    "training": "online, on recordings",
     "openscenario": "read and write scenarios",
     "paper": "stimuli, claims, figures",
     "rendering": "dashboard, window, video",
