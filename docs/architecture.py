@@ -25,6 +25,7 @@ SUBJECTS = {
     "tuning": "search of parameters",
     "benchmark": "suites, runs, rows, scores",
     "clips": "neuron on video files",
+    "comparison": "comparison of neurons",
     "agents": "rules, oracles, policies",
     "engine": "N environments, compiled",
     "plotting": "figures in one style",
