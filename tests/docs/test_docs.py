@@ -246,6 +246,13 @@ def test_the_changelog_has_the_groups_of_keep_a_changelog():
         assert [entry for entry in entries if entries.count(entry) > 1] == []
 
 
+def test_cards_are_short():
+    """That on the design of a policy has tables of its own."""
+    cards = [path for path in (DOCS / "cards").glob("*.md") if not path.stem.endswith("-design")]
+    assert len(cards) > 2
+    assert [path.stem for path in cards if len(path.read_text().split()) > 800] == []
+
+
 def test_the_readme_is_short():
     assert len((ROOT / "README.md").read_text().splitlines()) <= 130
 
