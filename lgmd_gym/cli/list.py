@@ -85,7 +85,7 @@ def agents() -> Table:
         card = read_card(find_policy(name))
         inputs = ", ".join(card["features"]["inputs"])
         description = f'Learned policy with the inputs {inputs}; requires the extra "train".'
-        options = "margin=0" if len(card["demands"] or ()) == 2 else ""
+        options = "margin=0" if card.get("brake") or len(card["demands"] or ()) == 2 else ""
         table.add_row(f"policy:{name}", _entry(description, "options", options))
     return table
 

@@ -72,7 +72,7 @@ class StateDataset:
             times += [episode.time_to_brake[:: features.repeat] for episode in group]
             before = [np.concatenate([[HOLD], episode.demands[:-1]]) for episode in group]
             demands += [values[:: features.repeat] for values in before]
-        self.features = np.concatenate(tables)
+        self.features = _joined(tables)
         self.classes = np.digitize(np.concatenate(times), limits_s)
         self.braking = np.concatenate(demands) < HOLD
 
@@ -98,6 +98,17 @@ class StateDataset:
     def mirror(self, name: str, values: np.ndarray) -> np.ndarray:
         """Return the mirror image of an input at some decisions, new array, (M, elements)."""
         return mirror_input(name, values)
+
+
+def _joined(tables: list[np.ndarray]) -> np.ndarray:
+    """Return tables one below the other. The list is emptied, so that few features are in memory twice."""
+    joined = np.empty((sum(map(len, tables)), tables[0].shape[1]), tables[0].dtype)
+    end = len(joined)
+    while tables:
+        part = tables.pop()
+        joined[end - len(part) : end] = part
+        end -= len(part)
+    return joined
 
 
 def policy_inputs(
