@@ -4,18 +4,18 @@
     python docs/experiments/results.py collect runs/results
     python docs/experiments/results.py pages
 
-`run` plays the suites in 20 test worlds, one folder per suite; those whose folder exists are not run again
-(complete an interrupted one with `lgmd-gym bench --resume FOLDER`). With `--agents`, agents of your own are
-played in place of those of the pages. `collect` writes `docs/results/scores.csv` and `traffic.csv` there;
-with `--print`, it prints tables instead. `pages` fills every block
+`run` plays the suites in 20 test worlds and traffic in more of them, one folder per suite; those whose folder
+exists are not run again (complete an interrupted one with `lgmd-gym bench --resume FOLDER`). With `--agents`,
+agents of your own are played in place of those of the pages. `collect` writes `docs/results/scores.csv` and
+`traffic.csv` there; with `--print`, it prints tables instead. `pages` fills every block
 
     <!-- table: KIND ARGUMENT … -->
     <!-- end of table -->
 
 of the pages in Markdown from the CSV files: KIND is `avoided`, `false`, `detected` or `warned` with suites as
 arguments and a line per agent, `cases` with suites and a line per case or family, `traffic`, or `summary` for
-the agents of `IDEAS`. The arguments after `:` are agents, all of them by default. Intervals are at 95 % and
-cluster by case and world.
+the agents of `IDEAS`; "–" stands for no result. The arguments after `:` are agents, all of them by default.
+Intervals are at 95 % and cluster by case and world.
 """
 
 import argparse
@@ -24,6 +24,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -119,16 +120,30 @@ def config_of(name: str, agents: Sequence[str]) -> RunConfig:
     if name == "levels":
         suite = str(Path(__file__).with_name("levels.toml"))
     if is_traffic(name):
-        more = {"first_seed": FIRST_TRAFFIC_SEED, "worlds": 1000}
+        more |= {"first_seed": FIRST_TRAFFIC_SEED, "worlds": 1000}
         agents = [agent for agent in agents if agent != BOUND]
     return RunConfig(suite=suite, agents=tuple(agents), seeds=SEEDS[name], conditions=("mixed",), **more)
 
 
 def play(folder: Path, agents: Sequence[str], suites: Sequence[str], jobs: int = 1) -> None:
-    """Run the suites without a folder."""
-    for name in suites:
+    """Run the suites without a folder.
+
+    Raises:
+        ValueError: If a folder has a run of other agents.
+    """
+    if agents == [BOUND]:
+        suites = [name for name in suites if not is_traffic(name)]
+    configs = {name: config_of(name, agents) for name in suites}
+    for name, config in configs.items():
+        if (folder / name).exists():
+            found = read_run(folder / name).config.agents
+            if found != config.agents:
+                raise ValueError(
+                    f"the run in {str(folder / name)!r} has the agents {' '.join(found)}, "
+                    f"not {' '.join(config.agents)}; choose another folder"
+                )
+    for name, config in configs.items():
         if not (folder / name).exists():
-            config = config_of(name, agents)
             benchmark.run(config, folder / name, Executor(jobs=jobs), plots=False, report=False)
 
 
@@ -136,7 +151,8 @@ def read(folder: Path) -> dict[str, StoredRun]:
     """Return the complete runs of a folder.
 
     Raises:
-        ValueError: If there are none, or one lacks episodes.
+        ValueError: If there are none, or one lacks episodes or has failed ones, or the runs with and without
+            targets differ in more than the suite.
     """
     runs = {name: read_run(folder / name) for name in SEEDS if (folder / name).exists()}
     if not runs:
@@ -147,6 +163,18 @@ def read(folder: Path) -> dict[str, StoredRun]:
             raise ValueError(
                 f"the run in {str(folder / name)!r} lacks {counted(missing, 'episode')}; "
                 f"complete it with lgmd-gym bench --resume {folder / name}"
+            )
+        errors = sum(row["error"] is not None for row in run.rows)
+        if errors:
+            raise ValueError(
+                f"the run in {str(folder / name)!r} has {counted(errors, 'failed episode')}; "
+                "correct the agent and run the suite in another folder"
+            )
+        twin = runs.get(name + SUFFIX)
+        if twin is not None and replace(twin.config, suite=run.config.suite) != run.config:
+            raise ValueError(
+                f"the runs in {str(folder / name)!r} and {str(folder / (name + SUFFIX))!r} differ in more "
+                "than the suite; run both with the same agents in another folder"
             )
     return runs
 
@@ -175,11 +203,10 @@ def groups(suite: str, rows: Sequence[Row]) -> dict[str, list[Row]]:
 def _rates(
     suite: str, group: str, agent: str, rows: Sequence[Row], twin: StoredRun | None
 ) -> Iterator[Score]:
-    played = [row for row in rows if row["error"] is None]
-    usual = without_fcw_driver(played)
+    usual = without_fcw_driver(rows)
     threats = [row for row in usual if row["threat"]]
     others = [row for row in usual if not row["threat"]]
-    warned = [row for row in played if row["fcw_driver"]]
+    warned = [row for row in rows if row["fcw_driver"] and row["threat"]]
     measures: dict[str, tuple[list[Row], str]] = {
         "avoided": (threats, "avoided"),
         "false": (others, "false_activation"),
@@ -187,7 +214,7 @@ def _rates(
     }
     if twin is not None:
         quiet = {_key(row): row["false_activation"] is False for row in twin.rows}
-        found = [{**row, "avoided": row["avoided"] and quiet.get(_key(row), False)} for row in threats]
+        found = [{**row, "avoided": row["avoided"] and quiet[_key(row)]} for row in threats]
         measures["detected"] = (found, "avoided")  # pyright: ignore[reportArgumentType]
     for measure, (chosen, key) in measures.items():
         if chosen:
@@ -238,8 +265,8 @@ def write_scores(scores: Iterable[Score], commit: str) -> None:
             *score[:4],
             score.rate.k,
             score.rate.n,
-            f"{100 * score.rate.low:.1f}",
-            f"{100 * score.rate.high:.1f}",
+            f"{100 * score.rate.low:.3f}",
+            f"{100 * score.rate.high:.3f}",
         )
         for score in scores
     )
@@ -269,6 +296,8 @@ def read_traffic() -> list[Drives]:
 
 
 def _lines(path: Path) -> list[list[str]]:
+    if not path.exists():
+        raise ValueError(f"no file {str(path)!r}; write it first with results.py collect FOLDER")
     with path.open(newline="") as file:
         next(file)
         return list(csv.reader(file))[1:]
@@ -288,21 +317,29 @@ def table(
     Raises:
         ValueError: For an unknown kind, or without results for an argument.
     """
-    split = arguments.index(":") if ":" in arguments else len(arguments)
-    suites, agents = list(arguments[:split]), list(arguments[split + 1 :])
-    if kind == "traffic":
-        return traffic_table([item for item in drives if not agents or item.agent in agents])
+    check_known("kind of table", kind, KINDS)
     if kind == "summary":
         return summary_table(scores, drives)
-    check_known("kind of table", kind, KINDS)
-    known = list(dict.fromkeys(score.agent for score in scores))
+    split = arguments.index(":") if ":" in arguments else len(arguments)
+    suites, agents = list(arguments[:split]), list(arguments[split + 1 :])
+    results = drives if kind == "traffic" else scores
+    known = list(dict.fromkeys(item.agent for item in results))
     for name in agents:
         check_known("agent of the results", name, known)
-    cells = {score[:4]: rate_text(score.rate) for score in scores}
+    for name in suites:
+        check_known("suite of the results", name, list(dict.fromkeys(item.suite for item in results)))
     agents = agents or known
+    if kind == "traffic":
+        return traffic_table([item for item in drives if item.agent in agents])
+    cells = {score[:4]: rate_text(score.rate) for score in scores}
     if kind != "cases":
-        lines = [[f"`{agent}`", *(cells[suite, ALL, agent, kind] for suite in suites)] for agent in agents]
+        lines = [
+            [f"`{agent}`", *(cells.get((suite, ALL, agent, kind), "–") for suite in suites)]
+            for agent in agents
+        ]
         return markdown([["agent", *suites], *lines])
+    if not suites:
+        raise ValueError("a table of cases requires suites; add them before the colon")
     lines = [["case" if suites[0] in BY_CASE else "family", *(f"`{agent}`" for agent in agents)]]
     rows = dict.fromkeys(score[:2] for score in scores if score.suite in suites and score.group != ALL)
     for suite, group in rows:
@@ -323,7 +360,8 @@ def summary_table(scores: Sequence[Score], drives: Sequence[Drives]) -> list[str
     needless = {item.agent: item for item in drives if item.suite == "traffic"}
     lines = [["agent", "idea", *SUMMARY, "needless brakes per 1,000 km of traffic", "reads"]]
     for agent, (idea, reads) in IDEAS.items():
-        cells = [f"{rate.k} of {rate.n}" for rate in (rates[agent, *column] for column in SUMMARY.values())]
+        columns = [rates.get((agent, *column)) for column in SUMMARY.values()]
+        cells = [f"{rate.k} of {rate.n}" if rate else "–" for rate in columns]
         drive = needless.get(agent)
         rate = f"{1000 * drive.needless / drive.km:.0f}" if drive else "–"
         lines.append([f"`{agent}`", idea, *cells, rate, reads])

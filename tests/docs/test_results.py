@@ -1,5 +1,8 @@
 """The script that plays the suites of the documentation, and the tables of the pages that it fills."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import pytest
 from support.examples import load
 from support.rows import threat_row
@@ -33,8 +36,9 @@ def test_scores_by_family_with_those_that_are_due_to_the_target(script):
     run = stored("ncap2023", cases)
     run.rows.append(threat_row("a", "ncap2023/CCRs/v50", avoided=True, **USUAL | {"fcw_driver": True}))
     twin = stored("ncap2023-without-target", cases, ["CCCscp"])
+    twin.rows.append(threat_row("a", "ncap2023/CCRs/v50", **USUAL | {"fcw_driver": True}))
     for row in twin.rows:
-        row["threat"] = False
+        row |= {"threat": False, "avoided": None, "false_activation": bool(row["false_activation"])}
     assert found(script, {"ncap2023": run, "ncap2023-without-target": twin}) == {
         ("ncap2023", "all", "a", "avoided"): (2, 3),
         ("ncap2023", "all", "a", "warned"): (1, 1),
@@ -48,13 +52,6 @@ def test_scores_by_family_with_those_that_are_due_to_the_target(script):
         ("ncap2023-without-target", "CCRs", "a", "false"): (0, 2),
         ("ncap2023-without-target", "CCCscp", "a", "false"): (1, 1),
     }
-
-
-def test_a_failed_episode_without_the_target_is_no_detection(script):
-    run, twin = (stored(suite, {"CCRs/v20": True}) for suite in ("ncap2023", "ncap2023-without-target"))
-    twin.rows[0] |= {"false_activation": None, "error": "ValueError"}
-    scores = found(script, {"ncap2023": run, "ncap2023-without-target": twin})
-    assert scores["ncap2023", "all", "a", "detected"] == (0, 1)
 
 
 def test_scores_of_the_regulation_are_stated_per_case(script):
@@ -95,6 +92,13 @@ def test_blocks_are_filled_and_the_rest_of_a_page_stays(script):
         script.filled(text.format("avoid r152"), make)
     with pytest.raises(ValueError, match="unknown agent of the results 'b'"):
         script.filled(text.format("avoided r152 : b"), make)
+    with pytest.raises(ValueError, match="unknown suite of the results 'r125'; did you mean 'r152'"):
+        script.filled(text.format("cases r125"), make)
+    with pytest.raises(ValueError, match="unknown agent of the results 'b'"):
+        script.filled(text.format("traffic : b"), make)
+    with pytest.raises(ValueError, match="requires suites"):
+        script.filled(text.format("cases : a"), make)
+    assert "| `a` | – |" in script.filled(text.format("false r152"), make)
 
 
 def test_the_table_of_the_start_page_has_a_line_per_idea(script):
@@ -133,6 +137,9 @@ def test_own_agents_are_played_and_printed(script, tmp_path, monkeypatch, capsys
     monkeypatch.setattr(script, "config_of", lambda name, agents: config)
     for _ in range(2):
         script.play(tmp_path / "runs", ["ttc-oracle"], ["mine"])
+    monkeypatch.setattr(script, "config_of", lambda name, agents: replace(config, agents=tuple(agents)))
+    with pytest.raises(ValueError, match="has the agents ttc-oracle, not no-brake; choose another folder"):
+        script.play(tmp_path / "runs", ["no-brake"], ["mine"])
     monkeypatch.setattr("sys.argv", ["results.py", "collect", str(tmp_path / "runs"), "--print"])
     script.main()
     assert "| `ttc-oracle` | 1/1 [21–100] |" in capsys.readouterr().out
@@ -141,4 +148,21 @@ def test_own_agents_are_played_and_printed(script, tmp_path, monkeypatch, capsys
     with pytest.raises(ValueError, match="lacks 2 episodes; complete it with lgmd-gym bench --resume"):
         script.read(tmp_path / "runs")
     with pytest.raises(ValueError, match=r"no runs in .*; play them first with results.py run"):
+        script.read(tmp_path)
+
+
+def test_runs_with_failed_episodes_or_other_twins_are_refused(script, monkeypatch, tmp_path):
+    run = stored("ncap2023", {"CCRs/v20": True})
+    twin = stored("ncap2023-without-target", {"CCRs/v20": True})
+    runs = {"ncap2023": run, "ncap2023-without-target": twin}
+    for name in runs:
+        (tmp_path / name).mkdir()
+    monkeypatch.setattr(script, "read_run", lambda folder: runs[folder.name])
+    monkeypatch.setattr(script, "make_plan", lambda config: SimpleNamespace(total=1))
+    assert script.read(tmp_path) == runs
+    runs["ncap2023-without-target"] = twin._replace(config=replace(twin.config, agents=("b",)))
+    with pytest.raises(ValueError, match="differ in more than the suite"):
+        script.read(tmp_path)
+    run.rows[0]["error"] = "ValueError: x"
+    with pytest.raises(ValueError, match="has 1 failed episode; correct the agent"):
         script.read(tmp_path)
