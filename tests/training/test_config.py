@@ -345,6 +345,7 @@ def test_command_rejects_unknown_hyperparameters_in_a_file(tmp_path, capsys):
     assert not out.exists()
 
 
+EXTRACTOR = {"features_extractor_class": "x"}
 WITHOUT_LAYERS = {"mirror": False, "n_networks": 2, "policy_kwargs": {"net_arch": {"vf": [8]}}}
 
 
@@ -354,6 +355,22 @@ WITHOUT_LAYERS = {"mirror": False, "n_networks": 2, "policy_kwargs": {"net_arch"
         ("ppo", {"policy": "MlpPolicyX"}, "cannot make ppo .*MlpPolicyX"),
         ("ppo", {"algo_kwargs": {"learning_rate": "lin_abc"}}, "cannot make ppo .*abc"),
         ("dqn", {"algo_kwargs": {"train_freq": "often"}}, "cannot make dqn "),
+        (
+            "time-to-brake",
+            {"algo_kwargs": {"policy_kwargs": {"foo": 1}}},
+            "cannot make time-to-brake .*'foo'",
+        ),
+        (
+            "time-to-brake",
+            {"algo_kwargs": {"policy_kwargs": {"activation_fn": "ReLU"}}},
+            "cannot make time-to",
+        ),
+        (
+            "time-to-brake",
+            {"algo_kwargs": {"policy_kwargs": {"net_arch": "abc"}}},
+            "cannot make time-to-brake",
+        ),
+        ("time-to-brake", {"algo_kwargs": {"policy_kwargs": EXTRACTOR}}, "cannot make time-to-brake "),
         ("time-to-brake", {"algo_kwargs": WITHOUT_LAYERS}, "net_arch of an ensemble must contain 'pi'"),
     ],
 )
