@@ -216,6 +216,11 @@ def test_cameras_are_presets_or_those_of_an_agent():
             {"extra_levels": ["5:CCRsCurve", "3:StandingBox,CCRsCurve"]},
             "extra_levels names 'CCRsCurve' in two sets, which would contain the same levels",
         ),
+        (
+            "ppo",
+            {"env_kwargs": {"neuron": "dsn"}},
+            "env_kwargs contains the neuron 'dsn'; use the option --neu",
+        ),
         ("ppo", {"env_kwargs": {"fps": 15}}, "fps in env_kwargs must be 30 Hz, the rate of agents, got 15"),
         (
             "ppo",
