@@ -69,7 +69,7 @@ def test_training_with_traffic_and_reuse_of_its_recordings(tmp_path, monkeypatch
     assert len(by_seed) == 2
     segments = [segment for episodes in by_seed for segment in episodes]
     assert len(segments) > 2
-    assert all(segment.traffic and not segment.threat for segment in segments)
+    assert all(segment.family == "traffic" and not segment.threat for segment in segments)
     monkeypatch.setattr(traffic.TrafficRecorder, "record", None)  # any recording raises
     assert cli.run(arguments(tmp_path, second, *options, "1", "--recordings", str(first))) == 0
     columns = (second / "log" / "progress.csv").read_text().splitlines()[0].split(",")
