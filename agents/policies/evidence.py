@@ -1,12 +1,15 @@
 """Evidence of a policy that estimates the time to brake: how long full braking can still wait."""
 
+from math import inf
+
 import numpy as np
 
 from lgmd_gym.agents.stages import Evidence, StageParams
 from lgmd_gym.errors import check_items, check_positive, shown
 from lgmd_gym.fields import number, record, value
 
-ODDS = "[-50, 50]"
+MAX_ODDS = 50.0  # means never
+ODDS = f"[-{MAX_ODDS:g}, {MAX_ODDS:g}]"
 # The outputs of a network depend on the size of the batch, because the order of float32 sums does. The
 # differences are near 1e-6. A distance from every threshold beyond this limit does not depend on them.
 SAFE_DISTANCE = 1e-3
@@ -25,7 +28,8 @@ class TimeToBrakeParams(StageParams):
 
     Action k of the policy stands for a time to brake below `limits_s[k]` and not below the limit before it;
     the last action for a longer one, or none. The log odds of a time to brake below a limit are those of the
-    sum of the probabilities of the actions up to it.
+    sum of the probabilities of the actions up to it. A threshold of 50, the upper end of the range, means
+    never: neither a margin nor extreme logits reach it.
     """
 
     label = "brake"
@@ -70,14 +74,15 @@ class TimeToBrakeParams(StageParams):
 
         Args:
             odds: Log odds, see `odds`.
-            margin: Added to the thresholds of all stages.
+            margin: Added to the thresholds of all stages but those of 50, which are never reached.
         """
         evidence = np.full(len(odds), int(Evidence.CLEAR))
         safe = np.ones(len(odds), np.bool_)
         for item in (Evidence.PRESENT, Evidence.WARNING, Evidence.PARTIAL, Evidence.FULL):
             name = item.name.lower()
             limit = self.limits_s.index(getattr(self, f"{name}_s"))
-            distance = odds[:, limit] - getattr(self, f"{name}_odds") - margin
+            threshold: float = getattr(self, f"{name}_odds")
+            distance = odds[:, limit] - (inf if threshold == MAX_ODDS else threshold) - margin
             evidence = np.where(distance > 0.0, int(item), evidence)
             safe &= np.abs(distance) > SAFE_DISTANCE
         return evidence, safe

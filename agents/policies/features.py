@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import cache
 from multiprocessing import current_process
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -20,10 +20,6 @@ from lgmd_gym.errors import check_items, check_known, shown
 from lgmd_gym.fields import Record, flag, number, record, value, whole
 from lgmd_gym.processes.files import complete_file
 from lgmd_gym.processes.inputs import MAX_BYTES, check_members, check_regular, read_bytes
-
-if TYPE_CHECKING:
-    pass
-
 
 TIME_CONSTANTS_S = (0.1, 0.4, 1.2)
 NUM_LEVELS = 1 + len(TIME_CONSTANTS_S)  # features per field
@@ -129,11 +125,17 @@ class FeatureConfig(Record):
         "Factor on training rewards: contacts cost up to 20, and the loss of DQN is linear beyond 1",
     )
 
+    def check(self) -> None:
+        """Raise ValueError for inputs that require the cameras of two agents."""
+        by_agent = {_cameras_for(name)[0]: name for name in self.inputs if name in ZONE_INPUTS}
+        if len(by_agent) > 1:
+            needs = " and ".join(f"{name!r} those of {agent}" for agent, name in by_agent.items())
+            raise ValueError(f"policy inputs must have the same cameras: {needs}; omit one of the two")
+
     @property
     def cameras_of(self) -> str | None:
         """Agent whose cameras the inputs require: "stopping-zone" or "all-round"; None for any cameras."""
-        required = {_cameras_for(name)[0] for name in self.inputs if name in ZONE_INPUTS}
-        return max(required, default=None)
+        return next((_cameras_for(name)[0] for name in self.inputs if name in ZONE_INPUTS), None)
 
     def latches(self, demands: Any) -> Any:
         """Return whether demands in [-1, 1] are held until the episode ends, bool, shape (N,)."""

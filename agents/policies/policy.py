@@ -13,9 +13,11 @@ from lgmd_gym.agents.policies.card import PolicyCard, policy_card
 from lgmd_gym.agents.policies.features import (
     FRAME,
     SCALES,
+    ZONE_INPUTS,
     FeatureConfig,
     FeatureHistory,
     announce_pickle,
+    check_zone_shape,
     load_normalizer,
 )
 from lgmd_gym.agents.policies.network import dense_layers, run_dense
@@ -119,8 +121,9 @@ class Policy(StagedAgent):
         network: The policy of stable-baselines3, a `BasePolicy`, whose bias includes the margin.
 
     Raises:
-        ValueError: If the file cannot be read or has no card, if stable-baselines3 is not installed, or for a
-            margin that is out of range or not supported.
+        ValueError: If the file cannot be read or has no card, if the card has other fields or columns than
+            the inputs require, if stable-baselines3 is not installed, or for a margin that is out of range or
+            not supported.
     """
 
     name = "policy"
@@ -130,6 +133,7 @@ class Policy(StagedAgent):
         check_within("margin", margin, -MAX_MARGIN, MAX_MARGIN)
         file = find_policy(path)
         self.card = policy_card(file)
+        _check_fields(file, self.card)
         self.network = _load_network(file, self.card)
         names = tuple(getattr(self.network.observation_space, "spaces", ()))
         self._check_network(file, names)
@@ -160,6 +164,9 @@ class Policy(StagedAgent):
             faults.append(f"inputs {', '.join(names) or space} instead of {', '.join(sorted(expected))}")
         if actions != card.num_actions:
             faults.append(f"{actions or 'continuous'} actions instead of {card.num_actions or 'continuous'}")
+        for name in (item for item in names if item in ZONE_INPUTS):
+            if space[name].shape != (ZONE_INPUTS[name].size,):
+                faults.append(f"{space[name].shape[0]} values of {name} instead of {ZONE_INPUTS[name].size}")
         if not faults and card.features is None and "spike_frequency" in names:
             cameras = space["spike_frequency"].shape[0], _count(card.camera)
             faults += [f"{cameras[0]} cameras instead of {cameras[1]}"] if cameras[0] != cameras[1] else []
@@ -327,6 +334,21 @@ def find_policy(text: str) -> Path:
     if not path.suffix and not path.is_file():
         raise unknown_name("policy", text, shipped_policies())
     return path
+
+
+def _check_fields(path: Path, card: PolicyCard) -> None:
+    """Raise ValueError unless the cameras of a card have the fields and columns that its inputs require."""
+    from lgmd_gym.sensing.channel import make_channels  # imports numba, which takes half a second
+
+    inputs = () if card.features is None else card.features.inputs
+    channels = make_channels(card.camera)
+    for name in (item for item in inputs if item in ZONE_INPUTS):
+        has_columns = ZONE_INPUTS[name].source == "column_potential"
+        count = sum(channel.columns for channel in channels) if has_columns else len(channels)
+        try:
+            check_zone_shape(name, (count,))
+        except ValueError as error:
+            raise ValueError(f"policy {shown(str(path))}: {error}") from None
 
 
 def _count(camera: "ChannelSpec") -> int:

@@ -19,6 +19,7 @@ brake above 0. Braking that is much too early counts as avoided, too; the area u
 margins, has the same limit. Recordings and results of an earlier run in DATA are used again.
 """
 
+import json
 from argparse import ArgumentParser
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -32,6 +33,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import seeding
 
+import lgmd_gym
 from lgmd_gym.agents.policies.evidence import TimeToBrakeParams
 from lgmd_gym.agents.policies.features import CLIP, GAINS, NORM, NUM_LEVELS, FeatureConfig, weaker
 from lgmd_gym.agents.rules import excitation
@@ -46,7 +48,7 @@ from lgmd_gym.agents.sides import (
     forward_cameras,
     side_cameras,
 )
-from lgmd_gym.aliases import Observation
+from lgmd_gym.aliases import Observation, Values
 from lgmd_gym.envs.episode_source import RandomLevels
 from lgmd_gym.neuron import Signal
 from lgmd_gym.processes.files import complete_file
@@ -99,7 +101,9 @@ class MeanGrey:
 def level_sets(split: str, count: int) -> list[tuple[str, list[str], range]]:
     """Return the name, the families (empty for the usual ones) and the seeds of each set of levels.
 
-    The shares of the sets are those of `policy:all-round`. A threat and its twin have the same seed.
+    The shares of the sets are those of `policy:all-round`. Crossing threats and the same levels without their
+    target have the same seeds. So do everyday threats, but `SecondThreat` has no variant without its target:
+    about three quarters of the seeds draw the same family in both sets.
     """
     sets = [ExtraEpisodes(CONFIG.n_timesteps, ()), *map(parse_levels, CONFIG.extra_levels)]
     share = count / sum(item.count for item in sets)
@@ -128,7 +132,7 @@ def record(folder: Path, split: str, count: int) -> None:
         if families:
             arguments["families"] = families
         recorder = DriveRecorder("LGMD/RandomBraking-v0", arguments, brakes=split == "train")
-        origin = {"split": split, "brakes": recorder.brakes}
+        origin = origin_of(split, families)
         for number in range(0, len(seeds), FILE_SIZE):
             part = seeds[number : number + FILE_SIZE]
             file = folder / split / name / f"{number:06d}.npz"
@@ -138,6 +142,13 @@ def record(folder: Path, split: str, count: int) -> None:
             by_seed = [[with_levels(item) for item in episodes] for episodes in recorder.record(part)]
             save(by_seed, file, origin)
             print(f"{file}: {len(part)} levels", flush=True)
+
+
+def origin_of(split: str, families: Sequence[str]) -> Values:
+    """Return the settings that the recorded levels of a set depend on, as plain values."""
+    origin: Values = {"lgmd_gym": lgmd_gym.__version__, "split": split, "brakes": split == "train"}
+    origin |= {"families": families, "env_kwargs": CONFIG.env_kwargs, "camera": cameras()}
+    return json.loads(json.dumps(origin))  # lists in place of tuples
 
 
 def with_levels(episode: DrivenEpisode) -> DrivenEpisode:
@@ -326,7 +337,7 @@ def world_of(split: str, seed: int) -> int:
 def results(
     folder: Path, sets: Sequence[Sequence[DrivenEpisode]], names: Sequence[str], seeds: int, epochs: int
 ) -> list[Outcomes]:
-    """Return the results of an arm, one per training; those in the folder are not repeated.
+    """Return the results of an arm, one per training; those in the folder of as many levels are kept.
 
     Args:
         folder: Folder of recordings and results.
@@ -336,7 +347,8 @@ def results(
         epochs: Epochs of each training.
     """
     name = "+".join(names).replace(" ", "_")
-    folder = folder / "results" / f"{len(sets[0])}-levels-{epochs}-epochs"
+    levels, validation = len(sets[0]), len(sets[1]) + len(sets[2])
+    folder = folder / "results" / f"{levels}-levels-{validation}-validation-{epochs}-epochs"
     folder.mkdir(parents=True, exist_ok=True)
     files = [folder / f"{name}-{seed}.npz" for seed in range(seeds)]
     missing = [seed for seed, file in enumerate(files) if not file.exists()]

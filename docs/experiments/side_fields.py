@@ -1,3 +1,5 @@
+# pyright: standard
+# Not strict: Gymnasium and matplotlib state few types.
 """A picture of the fields at the sides of `policy:all-round`, with a crossing car and without it.
 
 python docs/experiments/side_fields.py docs/side_fields.png
@@ -48,8 +50,8 @@ def main(path: Path, seed: int = SEED) -> np.ndarray:
 
 
 def camera_of(name: str) -> dict[str, Any]:
-    """Return the camera of a field with the LGMD; those of the other models show the same."""
-    return next(camera for camera in side_cameras() if camera["name"] == f"{name}_lgmd")
+    """Return the channel of a field with the DSN; that with the edges has the same camera."""
+    return next(camera for camera in side_cameras() if camera["name"] == f"{name}_dsn")
 
 
 def film(family: str, camera: dict[str, Any], seed: int) -> np.ndarray:

@@ -46,6 +46,11 @@ def _check_env_kwargs(name: str, env_kwargs: object) -> Arguments:
     given: Arguments = {} if env_kwargs is None else check_type(name, env_kwargs, dict)
     if "camera" in given:
         raise ValueError(f"{name} contains the camera {shown(given['camera'])}; use the option camera")
+    if "neuron" in given:
+        raise ValueError(
+            f"{name} contains the neuron {shown(given['neuron'])}; use the option --neuron, or in Python "
+            "with_neuron"
+        )
     config: Config = given.get("config") or {}
     rates = {"fps": given.get("fps"), "policy_frequency": config.get("policy_frequency")}
     for key, rate in rates.items():
@@ -118,7 +123,9 @@ class TrainConfig(Record):
         "Demands that the policy chooses from, in [-1, 1]; empty for a continuous demand",
     )
     features: FeatureConfig = value(None, _check_features, "Inputs and timing of the policy")
-    n_envs: int = whole(1, "[1, inf)", "", "Number of environments stepped in parallel")
+    n_envs: int = whole(
+        1, "[1, inf)", "", 'Number of environments stepped in parallel; not for "time-to-brake"'
+    )
     n_timesteps: int = whole(
         100_000,
         "[1, inf)",
@@ -377,6 +384,14 @@ def _check_time_to_brake(config: "TrainConfig") -> None:
         raise ValueError("algo 'time-to-brake' requires latch: false in its hyperparameters")
     if config.features.history != 1 or FRAME in config.features.inputs:
         raise ValueError("algo 'time-to-brake' requires history: 1 and inputs without frame")
+    usual = FeatureConfig()
+    for name, given, default in (
+        ("n_envs", config.n_envs, 1),
+        ("reward_scale", config.features.reward_scale, usual.reward_scale),
+        ("shrink", config.features.shrink, usual.shrink),
+    ):
+        if given != default:
+            raise ValueError(f"{name} has no effect with algo 'time-to-brake', got {given:g}; omit it")
     changed = set(config.env_kwargs.get("config") or {}) - {"action"}
     if changed and (config.traffic_episodes or config.extra_traffic):
         raise ValueError(

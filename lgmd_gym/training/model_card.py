@@ -1,5 +1,6 @@
 """The model card of a training run: `README.md` in the format of the Hugging Face Hub."""
 
+import csv
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -8,6 +9,7 @@ import numpy as np
 from lgmd_gym.aliases import Values
 from lgmd_gym.processes.files import complete_file
 from lgmd_gym.training.config import TrainConfig
+from lgmd_gym.training.hyperparams import TIME_TO_BRAKE
 
 FILE = "README.md"
 
@@ -54,14 +56,27 @@ class EvaluationResult(NamedTuple):
         return f"{self.mean:.2f} +/- {self.std:.2f}"
 
 
+class EpochResult(NamedTuple):
+    """The best epoch of a training run on recorded episodes, on those of the validation split."""
+
+    loss: float  # mean cross-entropy
+    area: float | None  # area under the ROC curve, see `StateEvaluation`; None without both outcomes
+
+    def __str__(self) -> str:
+        loss = f"loss {self.loss:.3f}"
+        return loss if self.area is None else f"{loss}, area under the ROC curve {self.area:.4f}"
+
+
 def write_model_card(config: TrainConfig, folder: Path, version: str) -> None:
     """Write the model card of a finished training run into its folder."""
     import yaml
 
-    result = best_result(folder)
+    result, epoch = best_result(folder), best_epoch(folder)
     text = "The training had no evaluation."
     if result is not None:
         text = f"Best evaluation: mean return {result} over {result.episodes} episodes of `validation`."
+    elif epoch is not None:
+        text = f"Best epoch, on the decisions of the recorded episodes of `validation`: {epoch}."
     page = _PAGE.format(
         algo=config.algo.upper(),
         env_id=config.env_id,
@@ -76,7 +91,7 @@ def write_model_card(config: TrainConfig, folder: Path, version: str) -> None:
 
 
 def best_result(folder: Path) -> EvaluationResult | None:
-    """Return the best evaluation in a training folder; None without one, as on recorded episodes."""
+    """Return the evaluation with the highest mean return; None without one, as on recorded episodes."""
     file = folder / "best" / "evaluations.npz"
     if not file.exists():
         return None
@@ -86,11 +101,28 @@ def best_result(folder: Path) -> EvaluationResult | None:
     return EvaluationResult(float(best.mean()), float(best.std()), best.size)
 
 
+def best_epoch(folder: Path) -> EpochResult | None:
+    """Return the epoch with the lowest loss in a training folder; None without one, as of `DQN`."""
+    file = folder / "log" / "progress.csv"
+    if not file.exists():
+        return None
+    with file.open(encoding="utf-8", newline="") as lines:
+        rows = [row for row in csv.DictReader(lines) if row.get("loss")]
+    best = min(rows, key=lambda row: float(row["loss"]), default=None)
+    if best is None:
+        return None
+    area = best.get("area")
+    return EpochResult(float(best["loss"]), float(area) if area else None)
+
+
 def _metadata(config: TrainConfig, result: EvaluationResult | None) -> Values:
     """Return the YAML metadata of the Hub."""
+    kinds = ["reinforcement-learning", "deep-reinforcement-learning"]
+    if config.algo == TIME_TO_BRAKE:
+        kinds = ["supervised-learning"]
     metadata: Values = {
         "library_name": "stable-baselines3",
-        "tags": ["reinforcement-learning", "deep-reinforcement-learning", "stable-baselines3", config.env_id],
+        "tags": [*kinds, "stable-baselines3", config.env_id],
     }
     if result is not None:
         entry = {

@@ -39,6 +39,7 @@ FILE_SIZE = 100  # largest number of seeds in one file
 TRAFFIC_RATIO = 4  # training episodes in traffic per validation episode in traffic
 EXTRA_TRAFFIC_STRIDE = 100_000  # distance between the first seeds of neighbouring sets in traffic
 EXTRA_RATIO = 20  # extra levels for training per extra level for validation
+REUSED = "omit --recordings, or record in a new training folder"  # for recordings with other settings
 FORMAT = 6  # of the files; recordings of another format are rejected
 
 
@@ -176,7 +177,7 @@ def check_recordings(config: TrainConfig) -> None:
                         f"{str(file)!r} is damaged; "
                         f"lgmd-gym train --resume {config.recordings} records it again"
                     )
-            count = sum(check_file(file, origin) for file in stored)
+            count = sum(check_file(file, origin, REUSED) for file in stored)
             if count == 0:
                 raise ValueError(
                     f"no recorded episodes in {str(files)!r}; "

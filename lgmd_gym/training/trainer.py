@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 CONFIG_FILE = "config.json"
 SET_BY_TRAINER = {"policy", "env", "seed", "device", "tensorboard_log", "verbose", "self"}
 """Arguments of algorithms that are not hyperparameters."""
+# Errors of stable-baselines3 and PyTorch, beside ValueError, for unsuitable hyperparameters.
+UNSUITABLE = (AssertionError, AttributeError, KeyError, RuntimeError, TypeError)
 # Attributes of a saved model that describe its training only, such as paths.
 EXCLUDED = (
     "tensorboard_log",
@@ -71,8 +73,9 @@ def train(config: TrainConfig, folder: Path, *, progress: bool = False, jobs: in
 def resume(folder: Path, *, progress: bool = False, jobs: int = 1) -> Path:
     """Resume an interrupted training run with the configuration in its folder.
 
-    It continues from the newest checkpoint that opens; damaged files are named on stderr. Args and
-    return value are those of `train`.
+    It continues from the newest checkpoint that opens; damaged files are named on stderr. With
+    "time-to-brake", it keeps the recorded files that are complete, records the others, and trains from the
+    beginning. Args and return value are those of `train`.
 
     Raises:
         ValueError: If the folder contains no training, another process trains in it, or the recordings that
@@ -123,11 +126,15 @@ def _check_algorithm(config: TrainConfig, env: PolicyWrapper) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # on the number of environments, one here
             algorithm(config.policy, env, seed=config.seed, device="cpu", **algorithm_kwargs(config))
-    except (AssertionError, AttributeError, KeyError, TypeError, ValueError) as error:
-        raise ValueError(
-            f"stable-baselines3 cannot make {config.algo} ({error_reason(error)}); "
-            "correct the hyperparameters in the YAML file"
-        ) from None
+    except (*UNSUITABLE, ValueError) as error:
+        raise _cannot_make(config, error) from None
+
+
+def _cannot_make(config: TrainConfig, error: Exception) -> ValueError:
+    return ValueError(
+        f"stable-baselines3 cannot make {config.algo} ({error_reason(error)}); "
+        "correct the hyperparameters in the YAML file"
+    )
 
 
 def _train(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path:
@@ -208,10 +215,13 @@ def _make_learner(config: TrainConfig, env: PolicyWrapper) -> "TimeToBrakeLearne
     """Return the learner of recorded episodes.
 
     Raises:
-        ValueError: For an unknown hyperparameter, or one out of range.
+        ValueError: For an unknown hyperparameter, one out of range, or a network that cannot be made.
     """
     from lgmd_gym.training.offline.time_to_brake import TimeToBrakeLearner
 
     known = {*inspect.signature(TimeToBrakeLearner).parameters} - SET_BY_TRAINER
     check_keys(f"hyperparameter of {config.algo}", config.algo_kwargs, known)
-    return TimeToBrakeLearner(config.policy, env, seed=config.seed, **config.algo_kwargs)
+    try:
+        return TimeToBrakeLearner(config.policy, env, seed=config.seed, **config.algo_kwargs)
+    except UNSUITABLE as error:  # those of the learner itself are ValueErrors
+        raise _cannot_make(config, error) from None

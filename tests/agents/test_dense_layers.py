@@ -5,6 +5,7 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 
+from support import policies
 from support.policies import write_policy
 
 from lgmd_gym.agents import make_agent
@@ -69,10 +70,9 @@ def test_a_margin_changes_only_its_own_policy(tmp_path):
     assert again.network.action_net.bias.tolist() == bias.tolist()
 
 
-def test_a_changed_file_is_loaded_again(tmp_path):
-    from lgmd_gym.agents.policies.policy import SHIPPED
-
+def test_a_changed_file_is_loaded_again(tmp_path, monkeypatch):
     file = write_policy(tmp_path / "mine.zip")
     first = make_agent(f"policy:{file}").agent.network.action_net.weight.shape
-    file.write_bytes((SHIPPED / "all-round.zip").read_bytes())
+    monkeypatch.setattr(policies, "LAYERS", {"pi": [8], "vf": []})
+    write_policy(file)
     assert make_agent(f"policy:{file}").agent.network.action_net.weight.shape != first

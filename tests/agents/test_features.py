@@ -178,6 +178,10 @@ def test_shrink_frame_averages_blocks():
             "unknown policy input 'spike_frequncy'; did you mean 'spike_frequency'",
         ),
         ({"inputs": []}, "inputs must contain at least one policy input, got none"),
+        (
+            {"inputs": ["zones", "ffi", "columns"]},
+            "the same cameras: 'zones' those of stopping-zone and 'columns' those of all-round; omit one",
+        ),
         ({"histry": 3}, "unknown policy field 'histry'; did you mean 'history'"),
         ({"history": 0}, "history must be in \\[1, 1000\\], got 0"),
         ({"latch": 1}, "latch must be true or false, got 1"),

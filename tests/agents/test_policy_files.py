@@ -4,17 +4,19 @@ import json
 import zipfile
 
 import pytest
-from support.policies import write_policy
+from gymnasium import spaces
+from support import policies
 
 from lgmd_gym.agents import make_agent
 from lgmd_gym.agents.policies.card import CARD
+from lgmd_gym.agents.zones import zone_cameras
 
 pytest.importorskip("stable_baselines3")
 
 
 @pytest.fixture(scope="module")
 def policy(tmp_path_factory):
-    return write_policy(tmp_path_factory.mktemp("policy") / "small.zip")
+    return policies.write_policy(tmp_path_factory.mktemp("policy") / "small.zip")
 
 
 def copy_with_card(policy, path, **values):
@@ -35,6 +37,8 @@ def copy_with_card(policy, path, **values):
         ({"camera": "nix"}, "unknown camera"),
         ({"camera": 7}, "the card is damaged"),
         ({"features": {"inputs": ["zone"]}}, "did you mean 'zones'"),
+        ({"camera": zone_cameras()[1:]}, "input 'zones' requires the 17 cameras of stopping-zone, got 16"),
+        ({"features": {"inputs": ["columns"]}}, "'columns' requires the 250 columns of all-round, got 0"),
         ({"demands": [0.0, -1.5]}, r"demand must be in \[-1, 1\], got -1.5"),
         (
             {"demands": [0.0]},
@@ -51,6 +55,14 @@ def test_damaged_card(policy, tmp_path, values, words):
         make_agent(f"policy:{path}")
     assert "\n" not in str(caught.value)
     assert str(path) in str(caught.value)
+
+
+def test_a_network_for_other_fields(tmp_path, monkeypatch):
+    boxes = {name: spaces.Box(-5.0, 5.0, (64,) if name == "zones" else (1,)) for name in policies.INPUTS}
+    monkeypatch.setattr(policies._Spaces, "observation_space", spaces.Dict(boxes))
+    file = policies.write_policy(tmp_path / "other.zip")
+    with pytest.raises(ValueError, match="the model has 64 values of zones instead of 68; correct the card"):
+        make_agent(f"policy:{file}")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.99])

@@ -47,6 +47,14 @@ def test_evidence(odds, evidence):
     assert not params.evidence(np.array([[3.0005, -9.0, -9.0]]))[1][0]
 
 
+@pytest.mark.parametrize(("partial_odds", "expected"), [(49.0, PARTIAL), (50.0, CLEAR)])
+def test_a_threshold_of_50_is_never_reached(partial_odds, expected):
+    params = TimeToBrakeParams.make(BRAKE | {"partial_odds": partial_odds})
+    for odds, margin in ((31.0, -20.0), (900.0, 0.0)):
+        evidence, safe = params.evidence(np.array([[-90.0, odds, -90.0]]), margin)
+        assert (evidence[0], safe[0]) == (expected, True)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [

@@ -41,6 +41,11 @@ def test_frame_profile(tmp_path):
         assert min(stages[1], *stages[6:8]) > 0.0  # selection, ground, vehicles
 
 
+def test_cameras_of_the_side_fields():
+    channel = load("side_fields").camera_of("far_left")
+    assert (channel["camera"]["name"], channel["neuron"]) == ("far_left", "dsn")
+
+
 @pytest.mark.slow
 def test_side_fields(tmp_path):
     """The car comes from the left and the two levels differ by it only: the fields at the right are equal."""

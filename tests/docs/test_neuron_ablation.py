@@ -1,12 +1,14 @@
 """The script docs/experiments/neuron_ablation.py: inputs by value, and a run with a tiny budget."""
 
 import re
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
 import pytest
 from support.examples import load
 
+import lgmd_gym
 from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.agents.sides import NUM_COLUMNS, NUM_FORWARD_COLUMNS, NUM_FORWARD_FIELDS, NUM_SIDE_FIELDS
 from lgmd_gym.neuron import LGMDParams, make
@@ -106,6 +108,36 @@ def test_sets_of_levels(script):
     assert {seeds.start for _, _, seeds in sets} == {10_000}
     assert sets[0][1] == []
     assert sets[3][1] == [f"{family}WithoutTarget" for family in sets[2][1]]
+
+
+@pytest.mark.parametrize("name", ["env_kwargs", "families", "camera", "lgmd_gym"])
+def test_levels_of_other_settings_are_not_used_again(script, tmp_path, monkeypatch, name):
+    def record(self, seeds):
+        return [[episode(script, 3, True)] for _ in seeds]
+
+    monkeypatch.setattr(script.DriveRecorder, "record", record)
+    monkeypatch.setattr(script, "with_levels", lambda item: item)
+    script.record(tmp_path, "validation", 40)
+    monkeypatch.setattr(script.DriveRecorder, "record", None)  # any recording raises
+    script.record(tmp_path, "validation", 40)
+    config = script.CONFIG
+    if name == "env_kwargs":
+        monkeypatch.setattr(script, "CONFIG", replace(config, env_kwargs={"world": 3}))
+    elif name == "families":
+        number, _ = config.extra_levels[0].split(":")
+        extra_levels = (f"{number}:CCRs", *config.extra_levels[1:])
+        monkeypatch.setattr(script, "CONFIG", replace(config, extra_levels=extra_levels))
+    elif name == "camera":
+        monkeypatch.setattr(script, "cameras", list)
+    else:
+        monkeypatch.setattr(lgmd_gym, "__version__", "0")
+    with pytest.raises(ValueError, match=f"recorded with another {name} "):
+        script.record(tmp_path, "validation", 40)
+
+
+def test_results_belong_to_the_number_of_levels(script, tmp_path):
+    script.results(tmp_path, ([0] * 5, [0] * 2, [0] * 3), ("lgmd",), 0, 1)
+    assert [item.name for item in (tmp_path / "results").iterdir()] == ["5-levels-5-validation-1-epochs"]
 
 
 def test_world_of_a_level(script):

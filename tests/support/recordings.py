@@ -43,4 +43,4 @@ def synthetic_episode(length=4, seed=0, threat=True, traffic=False, frames=False
     times = np.arange(length)[::-1] / 30.0 if threat else np.full(length, np.inf)
     demands = rng.choice([0.0, -0.4, -1.0], length).astype(np.float32)
     family = "traffic" if traffic else "CCRs" if threat else "EmptyRoad"
-    return DrivenEpisode(observations, times.astype(np.float32), demands, threat, traffic, family)
+    return DrivenEpisode(observations, times.astype(np.float32), demands, threat, family)

@@ -216,6 +216,11 @@ def test_cameras_are_presets_or_those_of_an_agent():
             {"extra_levels": ["5:CCRsCurve", "3:StandingBox,CCRsCurve"]},
             "extra_levels names 'CCRsCurve' in two sets, which would contain the same levels",
         ),
+        (
+            "ppo",
+            {"env_kwargs": {"neuron": "dsn"}},
+            "env_kwargs contains the neuron 'dsn'; use the option --neu",
+        ),
         ("ppo", {"env_kwargs": {"fps": 15}}, "fps in env_kwargs must be 30 Hz, the rate of agents, got 15"),
         (
             "ppo",
@@ -279,7 +284,11 @@ def test_unknown_keys_in_a_stored_config_are_rejected():
     [
         ("ppo", {"seed": 3}, "unknown hyperparameter of ppo 'seed'"),
         ("time-to-brake", {"seed": 3}, "unknown hyperparameter of time-to-brake 'seed'"),
-        ("time-to-brake", {"mirror": True}, "mirror does not support the input 'ffi'; set mirror to false"),
+        (
+            "time-to-brake",
+            {"mirror": True},
+            "mirror .* input 'ffi'; set mirror: false in the file of --hyper",
+        ),
         ("ppo", {"learning_rat": 0.1}, "hyperparameter of ppo 'learning_rat'; did you mean 'learning_rate'"),
         (
             "time-to-brake",
@@ -341,6 +350,7 @@ def test_command_rejects_unknown_hyperparameters_in_a_file(tmp_path, capsys):
     assert not out.exists()
 
 
+EXTRACTOR = {"features_extractor_class": "x"}
 WITHOUT_LAYERS = {"mirror": False, "n_networks": 2, "policy_kwargs": {"net_arch": {"vf": [8]}}}
 
 
@@ -350,6 +360,22 @@ WITHOUT_LAYERS = {"mirror": False, "n_networks": 2, "policy_kwargs": {"net_arch"
         ("ppo", {"policy": "MlpPolicyX"}, "cannot make ppo .*MlpPolicyX"),
         ("ppo", {"algo_kwargs": {"learning_rate": "lin_abc"}}, "cannot make ppo .*abc"),
         ("dqn", {"algo_kwargs": {"train_freq": "often"}}, "cannot make dqn "),
+        (
+            "time-to-brake",
+            {"algo_kwargs": {"policy_kwargs": {"foo": 1}}},
+            "cannot make time-to-brake .*'foo'",
+        ),
+        (
+            "time-to-brake",
+            {"algo_kwargs": {"policy_kwargs": {"activation_fn": "ReLU"}}},
+            "cannot make time-to",
+        ),
+        (
+            "time-to-brake",
+            {"algo_kwargs": {"policy_kwargs": {"net_arch": "abc"}}},
+            "cannot make time-to-brake",
+        ),
+        ("time-to-brake", {"algo_kwargs": {"policy_kwargs": EXTRACTOR}}, "cannot make time-to-brake "),
         ("time-to-brake", {"algo_kwargs": WITHOUT_LAYERS}, "net_arch of an ensemble must contain 'pi'"),
     ],
 )

@@ -60,16 +60,16 @@ def test_inputs_of_an_episode_equal_those_of_a_feature_history(fields, repeat):
     observations = {name: rng.random((40, size), np.float32) for name, size in sizes.items()}
     inputs = (*SCALES, "speed_change", "spike_peak", *fields)
     features = FeatureConfig(inputs=inputs, history=1, repeat=repeat)
-    (found,), history = policy_inputs([observations], features, np.float32), FeatureHistory(features)
+    (found,), history = policy_inputs([observations], features), FeatureHistory(features)
     assert set(found) == set(inputs)
     for time in range(40):
         history.update({name: values[time : time + 1] for name, values in observations.items()})
         if time % repeat == 0:
             for name, expected in history.stack().items():
-                assert found[name][time // repeat] == pytest.approx(expected[0], abs=1e-6)
-    for name, rounded in policy_inputs([observations], features)[0].items():
-        assert rounded.dtype == (np.float16 if name in ZONE_INPUTS else np.float32)
-        assert rounded == pytest.approx(found[name], abs=5e-4)
+                rounded = name in ZONE_INPUTS
+                assert found[name].dtype == (np.float16 if rounded else np.float32)
+                tolerance = 5e-4 if rounded else 1e-6
+                assert found[name][time // repeat] == pytest.approx(expected[0], abs=tolerance)
 
 
 def test_mirrored_decisions_of_a_batch():

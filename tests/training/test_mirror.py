@@ -75,5 +75,6 @@ def test_ego_motion_and_forward_fields():
     assert mirrored("ego_speed", np.array([2.0])).tolist() == [2.0]
     assert mirrored("known_deceleration", np.array([0.5])).tolist() == [0.5]
     assert mirrored("ego_yaw_rate", np.array([2.0])).tolist() == [-2.0]
-    with pytest.raises(ValueError, match="mirror does not support the input 'frame'; set mirror to false"):
+    assert mirrored("speed_change", np.array([-0.5])).tolist() == [-0.5]
+    with pytest.raises(ValueError, match="mirror does not support the input 'frame'; set mirror: false in"):
         mirror_input("frame", np.zeros((1, 4)))

@@ -234,6 +234,9 @@ def test_training_writes_a_policy_with_a_brake(tmp_path):
         ({"text": YAML.replace("n_epochs", "epochs")}, "n_epochs"),
         ({"text": YAML.replace("full_odds", "full_odd")}, "full_odds"),
         ({"text": YAML.replace("history: 1", "history: 2")}, "requires history: 1"),
+        ({"n_envs": 2}, "n_envs has no effect with algo 'time-to-brake', got 2; omit it"),
+        ({"text": YAML.replace("history: 1", "history: 1, reward_scale: 0.1")}, "reward_scale has no .*0.1"),
+        ({"text": YAML.replace("history: 1", "history: 1, shrink: 4")}, "shrink has no effect .*got 4"),
     ],
 )
 def test_wrong_options(tmp_path, changes, message):

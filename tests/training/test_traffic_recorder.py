@@ -106,7 +106,7 @@ def test_segment_before_a_contact_has_its_time_to_brake():
     """The contact is after 4.57 s; full braking avoids it up to 3.3 s."""
     observations = observations_of(Following())
     episode = threat_episode(Following(), 0, observations)
-    assert (episode.threat, episode.traffic, len(episode)) == (True, True, 137)
+    assert (episode.threat, episode.family, len(episode)) == (True, "traffic", 137)
     assert not episode.demands.any()
     last = int(np.argmax(episode.time_to_brake == 0.0))
     assert 95 <= last <= 101

@@ -37,7 +37,7 @@ def test_second_training_reuses_the_recordings_of_the_first(tmp_path, monkeypatc
     assert not (second / "episodes").exists()
     rows = [*csv.DictReader((second / "log" / "progress.csv").open())]
     assert rows[-1]["best_loss"] == min((row["loss"] for row in rows), key=float)
-    assert "The training had no evaluation." in (second / "README.md").read_text()
+    assert f"`validation`: loss {float(rows[-1]['best_loss']):.3f}" in (second / "README.md").read_text()
     card = read_card(second / "policy.zip")
     assert card["algo"] == "ppo"
     assert card["config"]["algo"] == "time-to-brake"
@@ -69,7 +69,7 @@ def test_training_with_traffic_and_reuse_of_its_recordings(tmp_path, monkeypatch
     assert len(by_seed) == 2
     segments = [segment for episodes in by_seed for segment in episodes]
     assert len(segments) > 2
-    assert all(segment.traffic and not segment.threat for segment in segments)
+    assert all(segment.family == "traffic" and not segment.threat for segment in segments)
     monkeypatch.setattr(traffic.TrafficRecorder, "record", None)  # any recording raises
     assert cli.run(arguments(tmp_path, second, *options, "1", "--recordings", str(first))) == 0
     columns = (second / "log" / "progress.csv").read_text().splitlines()[0].split(",")

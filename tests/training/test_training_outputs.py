@@ -116,6 +116,18 @@ def test_model_card_without_an_evaluation(tmp_path):
     assert "The training had no evaluation." in text
 
 
+def test_model_card_of_a_training_on_recordings(tmp_path):
+    """The second of three epochs has the lowest loss."""
+    (tmp_path / "log").mkdir()
+    rows = ["loss,train_loss,area", "0.5,0.6,", "0.25,0.4,0.9712345", "0.3,0.2,0.99", ""]
+    (tmp_path / "log" / "progress.csv").write_text("\n".join(rows))
+    write_model_card(recorded_config(tmp_path), tmp_path, "0.1")
+    text = (tmp_path / "README.md").read_text()
+    assert "`validation`: loss 0.250, area under the ROC curve 0.9712.\n" in text
+    metadata = yaml.safe_load(text.split("---\n")[1])
+    assert metadata["tags"] == ["supervised-learning", "stable-baselines3", "LGMD/RandomBraking-v0"]
+
+
 @pytest.mark.parametrize(
     ("saved", "kept"),
     [

@@ -34,7 +34,10 @@ from lgmd_gym.agents.sides import (
 from lgmd_gym.training.offline.episodes import DrivenEpisode, Observation
 
 EPISODES_AT_ONCE = 16  # whose inputs are computed together
-EVEN = ("ego_speed", "ego_acceleration", "known_deceleration", "zones", "zones_spikes", "zones_ffi")
+EVEN = (
+    *("ego_speed", "ego_acceleration", "known_deceleration", "speed_change"),
+    *("zones", "zones_spikes", "zones_ffi"),
+)
 """Inputs that the mirror image does not change."""
 EXCHANGED = ("columns", "sides_ffi")
 """Inputs of which the mirror image exchanges left and right."""
@@ -111,21 +114,20 @@ def _joined(tables: list[np.ndarray]) -> np.ndarray:
     return joined
 
 
-def policy_inputs(
-    episodes: Sequence[Observation], features: FeatureConfig, zone_type: type[np.floating] = np.float16
-) -> list[dict[str, np.ndarray]]:
+def policy_inputs(episodes: Sequence[Observation], features: FeatureConfig) -> list[dict[str, np.ndarray]]:
     """Return the inputs of episodes at each decision of the policy, without a history, (decisions, ...) each.
+
+    Inputs in `ZONE_INPUTS` are rounded to float16, three digits.
 
     Args:
         episodes: Observations of each episode by name, (T, ...) each; frames are shrunk already.
         features: Inputs and timing of the policy.
-        zone_type: Type of the inputs in `ZONE_INPUTS`; float16 rounds them to three digits.
 
     Raises:
         ValueError: If an observation is missing, or comes from other cameras than an input requires.
     """
     lengths = np.array([len(next(iter(observations.values()))) for observations in episodes])
-    history = FeatureHistory(replace(features, history=1, shrink=1), len(episodes), zone_type)
+    history = FeatureHistory(replace(features, history=1, shrink=1), len(episodes), np.float16)
     names = {source_observation(name) for name in features.inputs} & set(episodes[0])
     padded = {name: _padded([item[name] for item in episodes]) for name in names}
     tables: dict[str, np.ndarray] = {}
@@ -177,7 +179,9 @@ def check_mirror(names: Iterable[str]) -> None:
     """Raise ValueError for an input without a known mirror image."""
     for name in names:
         if name not in (*EVEN, *EXCHANGED, "ego_yaw_rate"):
-            raise ValueError(f"mirror does not support the input {name!r}; set mirror to false")
+            raise ValueError(
+                f"mirror does not support the input {name!r}; set mirror: false in the file of --hyperparams"
+            )
 
 
 @cache

@@ -34,7 +34,6 @@ class DrivenEpisode:
     time_to_brake: np.ndarray
     demands: np.ndarray  # longitudinal demand at each decision, float32 (T,)
     threat: bool  # whether some decision has a finite time to brake
-    traffic: bool = False  # whether the episode is a segment of a traffic episode
     family: str = ""  # scenario family of the level; "traffic" in traffic, empty if unknown
 
     def __len__(self) -> int:
@@ -99,7 +98,6 @@ def save(by_seed: Sequence[Sequence[DrivenEpisode]], file: Path, origin: Values)
         "counts": np.array([len(group) for group in by_seed]),
         "lengths": np.array([len(episode) for episode in episodes]),
         "threats": np.array([episode.threat for episode in episodes], bool),
-        "traffic": np.array([episode.traffic for episode in episodes], bool),
         "families": np.array([episode.family for episode in episodes], str),
     }
     if episodes:
@@ -127,12 +125,13 @@ def load(file: Path) -> list[list[DrivenEpisode]]:
         return [[next(episodes) for _ in range(count)] for count in archive["counts"]]
 
 
-def check_file(file: Path, origin: Values) -> int:
+def check_file(file: Path, origin: Values, remedy: str = "train in a new folder") -> int:
     """Return the number of seeds in a file without loading its episodes.
 
     Args:
         file: File written by `save`.
         origin: Required settings; the file may have others.
+        remedy: What to do about other settings, for the message.
 
     Raises:
         ValueError: If the file contains no recorded episodes, or was recorded with other settings.
@@ -143,8 +142,7 @@ def check_file(file: Path, origin: Values) -> int:
             if recorded.get(key) != value:
                 raise ValueError(
                     f"the episodes in {str(file)!r} were recorded with another {key} "
-                    f"({', not '.join(map(_abbreviated, _difference(recorded.get(key), value)))}); "
-                    "omit --recordings, or record in a new training folder"
+                    f"({', not '.join(map(_abbreviated, _difference(recorded.get(key), value)))}); {remedy}"
                 )
         return len(archive["counts"])
 
@@ -193,6 +191,5 @@ def _episodes(archive: Any) -> Iterator[DrivenEpisode]:
             {name: array[part] for name, array in observations.items()},
             *(arrays[name][part] for name in PER_DECISION),
             threat=bool(arrays["threats"][index]),
-            traffic=bool(arrays["traffic"][index]),
             family=str(arrays["families"][index]),
         )

@@ -212,6 +212,5 @@ def _segment(observations: list[Observation], times: np.ndarray) -> DrivenEpisod
         times.astype(np.float32),
         np.zeros(len(times), np.float32),
         threat=bool(np.isfinite(times).any()),
-        traffic=True,
         family=TRAFFIC,
     )
