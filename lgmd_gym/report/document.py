@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple, cast
@@ -94,12 +95,20 @@ class Document(NamedTuple):
         environment = Environment(
             loader=PackageLoader("lgmd_gym.report", "."), autoescape=True, undefined=StrictUndefined
         )
+        environment.filters["code"] = _code
         template = environment.get_template("document.html")
         return template.render(document=self, paragraphs=_paragraphs, is_table=_is_table)
 
 
 def _is_table(value: object) -> bool:
     return isinstance(value, DataTable)
+
+
+def _code(text: str) -> str:
+    """Return a text for HTML, with `names` in backticks as code."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def _paragraphs(value: str) -> list[str]:
