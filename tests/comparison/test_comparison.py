@@ -183,12 +183,13 @@ def test_document_as_markdown_csv_json_and_html(tmp_path):
     )
     hidden = DataTable("h", ("n",), [(3,)], hidden=True)
     section = Section("One", "First.\n\nSecond.", (table, Figure("f.png", "A figure."), hidden))
+    (tmp_path / "f.png").write_bytes(b"PNG")
     Document("Title", "Text of `a<b`.", (section,)).write(tmp_path)
     assert "| a<b | 1.2 |" in (tmp_path / "report.md").read_text()
     assert "| name | x \\| y |\n| --- | ---: |" in (tmp_path / "report.md").read_text()
     page = (tmp_path / "report.html").read_text()
     assert "a&lt;b" in page
-    assert '<img src="f.png"' in page
+    assert '<img src="data:image/png;base64,UE5H" alt="A figure."' in page
     assert "<p>Second.</p>" in page
     assert "<p>Text of <code>a&lt;b</code>.</p>" in page
     assert page.count("<section") == page.count("</section>") == 1
