@@ -77,7 +77,7 @@ class LastMomentOracle(StagedAgent):
 
 
 class TTCOracle(StagedAgent):
-    """Warns and brakes fully when the true time to contact falls to thresholds: TTC ≤ `alert`, TTC ≤ `ttc`.
+    """Reads the true time to contact: warns when it falls to `alert`, brakes fully when it falls to `ttc`.
 
     Observes `info["ttc"]`.
 

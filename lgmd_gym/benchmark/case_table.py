@@ -164,10 +164,14 @@ def _numbers(values: Sequence[float], factor: float) -> list[str]:
 
 def _unit(family: str, name: str) -> str:
     """Return the unit of an argument in the docstring of its family; empty without one."""
-    parsed = parse(inspect.getdoc(FAMILIES.get(family)) or "", DocstringStyle.GOOGLE)
-    texts = [param.description or "" for param in parsed.params if param.arg_name == name]
-    found = _UNIT.search(" ".join(texts))
+    found = _UNIT.search(argument_text(family, name))
     return found[1] if found else ""
+
+
+def argument_text(family: str, name: str) -> str:
+    """Return the description of an argument in the docstring of its family; empty without one."""
+    parsed = parse(inspect.getdoc(FAMILIES.get(family)) or "", DocstringStyle.GOOGLE)
+    return " ".join(param.description or "" for param in parsed.params if param.arg_name == name)
 
 
 CASE_KEYS = ("family", "name", "speeds_kmh", "sweep", "fcw_driver", "arguments", "scenario", "cell")

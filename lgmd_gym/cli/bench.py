@@ -263,7 +263,8 @@ def _print_tables(benchmark: "Run", console: Console) -> None:
 
     config, suite = benchmark.config, benchmark.plan.suite
     if suite.name == OVERVIEW:
-        print_overview(benchmark.rows, list(dict.fromkeys([NO_BRAKE, *config.agents])), console)
+        agents = list(dict.fromkeys([NO_BRAKE, *config.agents]))
+        print_overview(benchmark.rows, agents, console, config.neuron)
         return
     for condition, rows in by_condition(benchmark.rows).items():
         title = f"{_title(benchmark)}, {condition}"

@@ -3,16 +3,19 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, cast
 
 from tyro.conf import Positional, arg
 
+from lgmd_gym.aliases import Values
 from lgmd_gym.cli.console import activity, make_console
-from lgmd_gym.cli.values import Count, File, Names, Number, default_out, read_params
+from lgmd_gym.cli.values import Count, File, Names, Number, default_out, read_camera, read_params
+from lgmd_gym.errors import counted
 
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from lgmd_gym.camera import CameraItem
     from lgmd_gym.report.document import DataTable
 
 MAX_ROWS = 45  # of a table in the terminal; longer ones are in the report
@@ -58,7 +61,7 @@ class CompareModels:
     clip_cap: float = 0.1
     """Highest share of earlier frames of clips in alarm."""
     camera: str = "fovea"
-    """Camera preset of the simulation."""
+    """Camera of the simulation: a preset, or a TOML file with the fields of one camera."""
     suites: Annotated[tuple[str, ...], arg(metavar="NAME [NAME ...]")] = ("quick",)
     """Suites of the simulation."""
     seeds: Count = None
@@ -170,11 +173,10 @@ def compare_models(options: CompareModels) -> int:
         )
     for module in options.module or ():
         neuron.import_models(module)
+    camera = _one_camera(options.camera)
     jobs = [] if options.clips is None else make_jobs(options.clips, options.crashes)
     seeds = options.seeds or (3 if options.quick else 20)
-    worlds = Worlds(
-        suites=options.suites, seeds=seeds, first_world=options.first_world, camera=options.camera
-    )
+    worlds = Worlds(suites=options.suites, seeds=seeds, first_world=options.first_world, camera=camera)
     settings = Comparison(
         models=options.models or PAGE_MODELS,
         parts=options.parts,
@@ -187,7 +189,8 @@ def compare_models(options: CompareModels) -> int:
         jobs=options.jobs,
     )
     out = default_out(options.out, "neurons")
-    values = {**vars(options), "clips": [job.clip for job in settings.clip_jobs], "models": settings.models}
+    values: Values = {**vars(options), "camera": camera, "models": settings.models}
+    values["clips"] = [job.clip for job in settings.clip_jobs]
     with run_folder(out, values) as folder:
         document = compare(settings, folder, activity)
     console = make_console()
@@ -197,6 +200,25 @@ def compare_models(options: CompareModels) -> int:
                 console.print(_table(section.title, item))
     console.print(f"report: {out / 'report.html'}", soft_wrap=True)
     return 0
+
+
+def _one_camera(text: str) -> "CameraItem":
+    """Return a preset's name, or the fields of the camera in a file.
+
+    Raises:
+        ValueError: If the file cannot be read, or has several cameras, a channel or an unknown field.
+    """
+    from lgmd_gym.camera import Camera
+
+    given = read_camera(text)
+    if isinstance(given, list) and len(given) != 1:
+        raise ValueError(
+            f"--camera {text!r} has {counted(len(given), 'camera')}, but all models are behind one; "
+            "name a file of each, in a comparison of its own"
+        )
+    camera = cast("CameraItem", given[0] if isinstance(given, list) else given)
+    Camera.make(camera)
+    return camera
 
 
 def run_events(options: Events) -> int:

@@ -18,8 +18,9 @@ if TYPE_CHECKING:
 class Train:
     """Train a policy with stable-baselines3; run it with --agents policy:FOLDER/policy.zip.
 
-    The folder contains TensorBoard logs, checkpoints, the evaluations on the validation split and the policy
-    with the best mean return in them. Ctrl-C keeps the checkpoints; --resume continues from the last one.
+    It prints the mean returns of training and validation as it goes. The folder contains TensorBoard logs,
+    checkpoints, the evaluations on the validation split and the policy with the best mean return in them.
+    Ctrl-C keeps the checkpoints; --resume continues from the last one.
     """
 
     algo: str = "dqn"
@@ -75,18 +76,20 @@ class Train:
 
 def run(options: Train) -> int:
     """Train a policy, or resume a training run, and print the path of the policy."""
+    from lgmd_gym.engine.first_use import compile_kernels
     from lgmd_gym.training import resume, train
 
     if options.resume is not None:
         refuse_unused(options, ("resume", "jobs"))
     _check_installed()
     folder = options.resume or default_out(options.out, f"train-{options.algo}")
-    progress = sys.stderr.isatty()
+    config = None if options.resume is not None else config_of(options)
     try:
-        if options.resume is not None:
-            policy = resume(folder, progress=progress, jobs=options.jobs)
+        compile_kernels()
+        if config is None:
+            policy = resume(folder, progress=True, jobs=options.jobs)
         else:
-            policy = train(config_of(options), folder, progress=progress, jobs=options.jobs)
+            policy = train(config, folder, progress=True, jobs=options.jobs)
     except KeyboardInterrupt:
         print(f"interrupted; {_what_is_kept(folder)}", file=sys.stderr)
         return 130
@@ -97,6 +100,8 @@ def run(options: Train) -> int:
 
 def _what_is_kept(folder: Path) -> str:
     """Return what an interrupted training has saved, and how to go on."""
+    if not folder.exists():
+        return "nothing was saved"
     resume = f"lgmd-gym train --resume {folder}"
     if any(folder.glob("checkpoints/model_*_steps.zip")) or any(folder.glob("episodes/*/*.npz")):
         return f"to resume: {resume}"

@@ -7,6 +7,7 @@ from pathlib import Path
 from lgmd_gym import neuron
 from lgmd_gym.benchmark.analysis.froc import LEAD_TIME, FrocPoint
 from lgmd_gym.benchmark.summary import AgentSummary
+from lgmd_gym.camera import Camera
 from lgmd_gym.comparison import figures
 from lgmd_gym.comparison.clips import ClipResponse, ClipScore
 from lgmd_gym.comparison.cost import BATCH, SHAPE, Cost
@@ -189,7 +190,7 @@ def of_simulation(
         )
     )
     items.append(_closed_loop_table(split, driven))
-    last = worlds.first_world + worlds.worlds - 1
+    last, camera = worlds.first_world + worlds.worlds - 1, Camera.make(worlds.camera).name
     threats, distance = chosen[0].point.detected.n, chosen[0].point.distance / 1000.0
     choice = (
         "They choose the threshold of each model: that with the most detections under a cap of false alarms."
@@ -199,7 +200,7 @@ def of_simulation(
     return Section(
         f"Simulation, {split} worlds",
         f"Suites {', '.join(worlds.suites)} with {worlds.seeds} seeds in worlds {worlds.first_world} to "
-        f"{last} and their weather, through the camera `{worlds.camera}`: {threats} threats, "
+        f"{last} and their weather, through the camera `{camera}`: {threats} threats, "
         f"{distance:.1f} km in which an alarm is false. A threat is detected by an alarm that begins 4 to "
         f"{LEAD_TIME:g} s before contact without braking. {choice}",
         tuple(items),

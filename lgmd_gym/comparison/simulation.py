@@ -28,7 +28,7 @@ from lgmd_gym.benchmark.suites import get_suite
 from lgmd_gym.benchmark.summary import AgentSummary, summarise
 from lgmd_gym.benchmark.task import Task
 from lgmd_gym.benchmark.units import make_units
-from lgmd_gym.camera import Camera
+from lgmd_gym.camera import Camera, CameraItem
 from lgmd_gym.engine.first_use import compile_kernels
 from lgmd_gym.envs.appearance import MIXED
 from lgmd_gym.errors import check_whole
@@ -50,14 +50,14 @@ class Worlds:
         seeds: Number of seeds of each case.
         first_world: First world; the runs of a case are in different ones.
         worlds: Number of worlds.
-        camera: Preset of the camera of all models.
+        camera: Camera of all models: a preset's name, a `Camera` or a mapping of its fields.
     """
 
     suites: tuple[str, ...] = ("quick",)
     seeds: int = 20
     first_world: int = 6100
     worlds: int = 20
-    camera: str = "fovea"
+    camera: CameraItem = "fovea"
 
     def tasks(self, sensors: SensorConfig) -> list[Task]:
         """Return the tasks without braking, each in a world and its weather."""
@@ -237,14 +237,14 @@ def detections(recordings: "Sequence[Recording]", threshold: float) -> list[bool
 
 
 def closed_loop(
-    chosen: Sequence[Operating], recordings: "dict[str, list[Recording]]", camera: str, jobs: int = 1
+    chosen: Sequence[Operating], recordings: "dict[str, list[Recording]]", camera: CameraItem, jobs: int = 1
 ) -> list[AgentSummary]:
     """Return how the rule `RULE` drives with each model, at its threshold of `MAIN_CAP`.
 
     Args:
         chosen: Thresholds of the models.
         recordings: Episodes without braking, which are played with the rule.
-        camera: Preset of the camera.
+        camera: Camera of all models, as of `Worlds`.
         jobs: Number of processes.
     """
     compile_kernels()

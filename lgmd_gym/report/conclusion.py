@@ -23,6 +23,7 @@ from lgmd_gym.benchmark.summary import (
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.camera.worlds import LABORATORY
 from lgmd_gym.errors import counted
+from lgmd_gym.report.sweep import sweep_sentences
 from lgmd_gym.statistics.intervals import Rate
 
 CAVEAT = (
@@ -43,7 +44,7 @@ def conclusion(rows: list[Row], agents: list[str], suite: Suite) -> tuple[str, s
     scores, limits = list[str](), list[str]()
     for condition, part in conditions.items():
         for sentences, found in (
-            (scores, _agent_sentences(part, braking)),
+            (scores, _agent_sentences(part, braking) + _sweep_sentences(part, braking, suite)),
             (limits, _limit_sentences(part, braking, suite)),
         ):
             heading = PLACES.get(condition) or f"Condition {condition}:"
@@ -76,6 +77,12 @@ def _agent_sentences(rows: list[Row], agents: list[str]) -> list[str]:
     if kinds == {False}:
         sentences.append("No episode has a threat: avoidance was not measured.")
     return sentences
+
+
+def _sweep_sentences(rows: list[Row], agents: list[str], suite: Suite) -> list[str]:
+    """Return with which swept argument the outcome of each agent varies most."""
+    complete = without_fcw_driver(rows)
+    return [text for agent in agents for text in sweep_sentences(complete, agent, suite.by_name)]
 
 
 def _agent_sentence(rows: list[Row], agent: str, kinds: set[bool]) -> str:

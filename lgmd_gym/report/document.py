@@ -1,9 +1,12 @@
 """A report of sections with text, tables and figures, as Markdown, HTML, CSV and JSON."""
 
+import base64
 import csv
 import json
 import math
+import re
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple, cast
 
@@ -37,7 +40,7 @@ class DataTable(NamedTuple):
 
 
 class Figure(NamedTuple):
-    """A figure of a file beside the report."""
+    """A figure in a PNG or SVG file beside the report."""
 
     file: str  # relative to the report
     caption: str
@@ -66,7 +69,7 @@ class Document(NamedTuple):
     def write(self, folder: Path) -> None:
         """Write report.md, report.html, results.json, and one CSV file for each table, into a folder."""
         replace_file(folder / "report.md", self.markdown())
-        replace_file(folder / "report.html", self.html())
+        replace_file(folder / "report.html", self.html(folder))
         tables = [item for section in self.sections for item in section.items if isinstance(item, DataTable)]
         values = {table.name: [_row(table, row) for row in table.rows] for table in tables}
         replace_file(folder / "results.json", json.dumps(values, indent=1) + "\n")
@@ -87,19 +90,33 @@ class Document(NamedTuple):
                 parts += [_markdown(item), item.caption]
         return "\n\n".join(part for part in parts if part) + "\n"
 
-    def html(self) -> str:
-        """Return the report as one page; its figures are embedded files beside it."""
+    def html(self, folder: Path) -> str:
+        """Return the report as one page that contains the figures in a folder."""
         from jinja2 import Environment, PackageLoader, StrictUndefined
 
         environment = Environment(
             loader=PackageLoader("lgmd_gym.report", "."), autoescape=True, undefined=StrictUndefined
         )
+        environment.filters |= {"code": _code, "picture": partial(_picture, folder)}
         template = environment.get_template("document.html")
         return template.render(document=self, paragraphs=_paragraphs, is_table=_is_table)
 
 
 def _is_table(value: object) -> bool:
     return isinstance(value, DataTable)
+
+
+def _picture(folder: Path, name: str) -> str:
+    """Return a PNG or SVG file as a data URI."""
+    kind = "svg+xml" if name.endswith(".svg") else "png"
+    return f"data:image/{kind};base64,{base64.b64encode((folder / name).read_bytes()).decode()}"
+
+
+def _code(text: str) -> str:
+    """Return a text for HTML, with `names` in backticks as code."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def _paragraphs(value: str) -> list[str]:

@@ -27,7 +27,7 @@ from lgmd_gym.benchmark.summary import (
 )
 from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.benchmark.traffic.summary import write_traffic_summary
-from lgmd_gym.neuron import LGMDParams, outside_code
+from lgmd_gym.neuron import LGMDParams
 from lgmd_gym.plotting.figures import episode_figure
 from lgmd_gym.processes.files import FolderLock, replace_file
 from lgmd_gym.report.conclusion import agent_note, conclusion
@@ -48,9 +48,10 @@ from lgmd_gym.report.sections import (
     false_activation_section,
     froc_section,
     illustrated_agent,
+    own_signal,
 )
 from lgmd_gym.report.svg import DARK_CSS, legend_mark, to_text
-from lgmd_gym.report.sweep import band, scenario_pictures, sweep_grids
+from lgmd_gym.report.sweep import band, scenario_pictures, sweep_grids, swept_arguments
 from lgmd_gym.report.traffic import write_traffic_report
 from lgmd_gym.statistics.intervals import Rate
 
@@ -99,6 +100,7 @@ def _render(data: ReportData) -> str:
         dark_css=DARK_CSS,
         failed=sum(row["error"] is not None for row in data.rows),
         pictures=scenario_pictures(data),
+        swept=swept_arguments(data.suite),
         conditions=[_condition(data, name, rows) for name, rows in by_condition(data.rows).items()],
         froc=froc_section(data),
         lead_time=LEAD_TIME,
@@ -196,7 +198,6 @@ def _write(path: Path, plots: bool, report: bool, trust: bool) -> list[Path]:
 def _plot_cases(path: Path, config: RunConfig) -> list[Path]:
     """Draw one figure per case: all agents with the first seed."""
     alert_level = LGMDParams.make(config.params).t_sf
-    own = config.neuron if config.neuron and outside_code(config.neuron) else ""
     folder, seed, files = path / "plots", config.first_seed, list[Path]()
     folder.mkdir(exist_ok=True)
     for condition in config.conditions:
@@ -207,5 +208,5 @@ def _plot_cases(path: Path, config: RunConfig) -> list[Path]:
             if episodes:
                 files.append(folder / f"{case_name(case.name, condition)}.png")
                 title = f"{case.name}, seed {seed}, {condition}"
-                episode_figure(files[-1], title, episodes, alert_level, own)
+                episode_figure(files[-1], title, episodes, alert_level, own_signal(config))
     return files

@@ -40,6 +40,12 @@ def save_figure(file: Path, draw: Callable[[BinaryIO], object]) -> str:
     return data_uri("image/svg+xml", drawn.getvalue())
 
 
+def own_signal(config: RunConfig) -> str:
+    """Return the neuron of a run if it is the user's, whose signals have units of its own; else ""."""
+    name = config.neuron or ""
+    return name if ":" in name and name.partition(":")[0] not in neuron.names() else ""
+
+
 @dataclass(frozen=True)
 class ReportData:
     """Contents of a run folder."""
@@ -85,9 +91,18 @@ class ReportData:
 
     @property
     def own_signal(self) -> str:
-        """Name of the neuron if it is the user's, whose signals have units of its own; else empty."""
-        name = self.config.neuron or ""
-        return name if name and neuron.outside_code(name) else ""
+        """See `own_signal`."""
+        return own_signal(self.config)
+
+    @property
+    def replay_place(self) -> str:
+        """Where the commands of `replay` run: the copy of a suite of one's own is in the run folder."""
+        folder = "in the run folder" if self.config.own_suite else ""
+        own_code = self.own_signal or any(map(outside_code, self.agents))
+        modules = "the folder of your modules" if own_code else ""
+        if folder and modules:
+            return f"{folder}, with {modules} in PYTHONPATH"
+        return folder or (f"in {modules}" if modules else "in any folder")
 
     def replay(self, row: Row) -> str:
         """Return the command that plays the episode of a row again in this folder; empty for none."""
@@ -227,14 +242,19 @@ def episode_section(data: ReportData) -> list[Values]:
     """Return the illustrated episodes: time series of all agents, and camera frames of one."""
     agent, episodes = illustrated_agent(data.agents), list[Values]()
     for group, rows in by_condition(without_fcw_driver(data.rows)).items():
-        for description, row in extreme_episodes(rows, agent, data.config.first_seed).items():
+        extremes = extreme_episodes(rows, agent, data.config.first_seed)
+        descriptions: dict[str, list[str]] = {}
+        for description, row in extremes.items():
+            descriptions.setdefault(row["case"], []).append(description)
+        for first, *others in descriptions.values():
+            row = extremes[first]
             by_agent = {name: data.series({**row, "agent": name}) for name in data.agents}
             stored = {name: series for name, series in by_agent.items() if series is not None}
             if agent in stored:
-                name = f"episode-{group}-{re.sub('[^a-z]+', '-', description)}"
+                name = f"episode-{group}-{re.sub('[^a-z]+', '-', first)}"
                 episodes.append(
                     {
-                        "description": description,
+                        "description": " and ".join([first, *others]),
                         "group": group,
                         "row": row,
                         "figure": _save_episode(data, name, stored),

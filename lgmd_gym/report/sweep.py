@@ -2,7 +2,8 @@
 
 import re
 
-from lgmd_gym.benchmark.case import Case, Row, file_name, relative_impact
+from lgmd_gym.benchmark.case import Case, Row, Suite, file_name, relative_impact
+from lgmd_gym.benchmark.case_table import argument_text
 from lgmd_gym.envs.dynamics.units import KMH
 from lgmd_gym.envs.motion import record_motion
 from lgmd_gym.envs.registration import RANDOM
@@ -11,7 +12,9 @@ from lgmd_gym.report.figures import CaseGrid, GridCell
 from lgmd_gym.report.sections import ReportData, save_figure
 
 BANDS = ("red", "brown", "orange", "yellow", "green")
+MAX_VALUES = 4  # of an argument that a sentence lists; of more, the best and the worst
 MAX_PICTURES = 3  # families whose first scenario is drawn
+_BOUNDS = re.compile(r",? in [\[(]|\s*\[|;")
 _PART = re.compile(r"(.*?)(-?\d[\d.e-]*)([a-z]\w*)?")
 
 
@@ -72,11 +75,67 @@ def _grid(family: str, agent: str, rows: list[Row], cases: dict[str, Case]) -> C
     return CaseGrid(f"{family}: {agent}", axis, columns, lines, agent, family)
 
 
+def swept_arguments(suite: Suite) -> list[tuple[str, str]]:
+    """Return each swept argument and its meaning in the docstring of its family, without bounds and unit.
+
+    A family that is not loaded, as one of a user in a report that is written later, has no meanings.
+    """
+    found: dict[str, str] = {}
+    for case in suite.cases:
+        for name, _ in case.swept:
+            if name not in found:
+                found[name] = _BOUNDS.split(argument_text(case.family, name))[0].strip().rstrip(".")
+    return [(name, text) for name, text in found.items() if text]
+
+
+def sweep_sentences(rows: list[Row], agent: str, cases: dict[str, Case]) -> list[str]:
+    """Return with which swept argument the outcome of an agent varies most, one sentence per family.
+
+    An outcome is good if a threat is avoided, or an episode without a threat has no false activation. A
+    family whose shares are equal at all values has no sentence.
+    """
+    played: dict[str, list[bool]] = {}
+    for row in rows:
+        if row["agent"] == agent and row["error"] is None:
+            played.setdefault(row["case"], []).append(_is_good(row))
+    families: dict[str, dict[str, dict[str, list[bool]]]] = {}
+    for case in cases.values():  # in the order of the suite
+        for name, part in case.swept if case.name in played else ():
+            parts = families.setdefault(case.family, {}).setdefault(name, {})
+            parts.setdefault(part, []).extend(played[case.name])
+    sentences: list[str] = []
+    for family, arguments in families.items():
+        name = max(arguments, key=lambda name: _spread(arguments[name]))
+        parts = arguments[name]
+        if _spread(parts) > 0.0:
+            shown = [*parts]
+            if len(shown) > MAX_VALUES:
+                shown.sort(key=lambda part: -_share(parts[part]))
+                shown = [shown[0], shown[-1]]
+            texts = [f"{sum(parts[part])} of {len(parts[part])} at {_quantity(name, part)}" for part in shown]
+            sentences.append(f"In {family}, {agent} varies most with {name}: good in {', '.join(texts)}.")
+    return sentences
+
+
+def _share(good: list[bool]) -> float:
+    return sum(good) / len(good)
+
+
+def _spread(parts: dict[str, list[bool]]) -> float:
+    shares = [*map(_share, parts.values())]
+    return max(shares) - min(shares)
+
+
+def _is_good(row: Row) -> bool:
+    """Return whether a threat is avoided, or a non-threat has no false activation."""
+    return bool(row["avoided"]) if row["threat"] else not row["false_activation"]
+
+
 def _cell(rows: list[Row] | None) -> GridCell | None:
     """Return the share of threats avoided and of non-threats without a false activation."""
     if not rows:
         return None
-    good = sum(bool(row["avoided"]) if row["threat"] else not row["false_activation"] for row in rows)
+    good = sum(map(_is_good, rows))
     contacts = sum(bool(row["collision"]) for row in rows)
     premature = sum(bool(row["premature_brake"]) for row in rows)
     impact = max(map(relative_impact, rows)) / KMH
@@ -97,7 +156,17 @@ def _value(part: str) -> str:
 
 def _axis(name: str, part: str) -> str:
     """Return the name of an argument with its unit in the names of cases."""
+    unit = _unit(name, part)
+    return f"{name} [{unit}]" if unit else name
+
+
+def _quantity(name: str, part: str) -> str:
+    """Return the value in a part of a case's name with its unit: "8 m" of "gap8m"."""
+    unit = _unit(name, part)
+    return f"{_value(part)} {unit}" if unit else _value(part)
+
+
+def _unit(name: str, part: str) -> str:
     match = _PART.fullmatch(part)
     unit = "km/h" if name == "ego_speed" else {"kmh": "km/h", "mps2": "m/s²"}.get(str(match and match[3]), "")
-    unit = unit or (match[3] or "" if match else "")
-    return f"{name} [{unit}]" if unit else name
+    return unit or (match[3] or "" if match else "")

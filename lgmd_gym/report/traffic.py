@@ -57,7 +57,7 @@ def write_traffic_report(path: Path) -> Path:
         ),
     )
     file = path / "report.html"
-    replace_file(file, document.html())
+    replace_file(file, document.html(file.parent))
     return file
 
 

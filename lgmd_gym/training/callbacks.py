@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
     from stable_baselines3.common.vec_env import VecEnv
 
+    from lgmd_gym.training.returns import Show
+
 DATA = "data"  # member of every model file of stable-baselines3
 DAMAGED = (  # raised by pickle for a file that is missing, truncated or damaged
     OSError, EOFError, pickle.UnpicklingError, ValueError, AttributeError, ImportError, IndexError, KeyError
@@ -84,7 +86,13 @@ class CheckpointSaver(BaseCallback):
 
 
 class Evaluator(EvalCallback):
-    """Evaluates on the same levels every time, so that evaluations are comparable."""
+    """Evaluates on the same levels every time, so that evaluations are comparable.
+
+    Attributes:
+        show: Shows the number of decisions and what the training does, for example in a progress bar.
+    """
+
+    show: "Show | None" = None
 
     def __init__(self, envs: "VecEnv", folder: Path, frequency: int, episodes: int) -> None:
         self._best, self._unfinished = folder / "best", folder / "best" / "unfinished"
@@ -96,6 +104,8 @@ class Evaluator(EvalCallback):
     def _on_step(self) -> bool:
         if self.n_calls % self.eval_freq:
             return True
+        if self.show is not None:
+            self.show(self.num_timesteps, "evaluating")
         self.eval_env.seed(VALIDATION_SEED)
         proceed = super()._on_step()
         for name in ("best_model.zip", "evaluations.npz"):

@@ -1,5 +1,7 @@
 """Training with the algorithms of stable-baselines3."""
 
+from collections.abc import Generator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +15,13 @@ if TYPE_CHECKING:
 
 
 def train_online(config: TrainConfig, folder: Path, progress: bool) -> "BaseAlgorithm":
-    """Train from the last checkpoint in the folder, if any; return the best model on the validation split."""
+    """Train from the last checkpoint in the folder, if any; return the best model on the validation split.
+
+    Args:
+        config: Configuration of the training.
+        folder: Training folder.
+        progress: Whether to print mean returns, with a progress bar on a terminal.
+    """
     import torch
 
     from lgmd_gym.training.callbacks import best_model, save_model
@@ -27,13 +35,8 @@ def train_online(config: TrainConfig, folder: Path, progress: bool) -> "BaseAlgo
         envs.seed(config.first_seed + model.num_timesteps)
         remaining = config.n_timesteps - model.num_timesteps
         if remaining > 0:
-            model.learn(
-                remaining,
-                _callbacks(config, folder, eval_envs, model),
-                reset_num_timesteps=False,
-                progress_bar=progress,
-                tb_log_name="log",
-            )
+            with _callbacks(config, folder, eval_envs, model, progress) as callbacks:
+                model.learn(remaining, callbacks, reset_num_timesteps=False, tb_log_name="log")
         save_model(model, folder / "last.zip")
     finally:
         envs.close()
@@ -98,12 +101,21 @@ def algorithm_kwargs(config: TrainConfig) -> Arguments:
     }
 
 
+@contextmanager
 def _callbacks(
-    config: TrainConfig, folder: Path, eval_envs: "VecEnv", model: "BaseAlgorithm"
-) -> "list[BaseCallback]":
+    config: TrainConfig, folder: Path, eval_envs: "VecEnv", model: "BaseAlgorithm", progress: bool
+) -> Generator["list[BaseCallback]", None, None]:
     from lgmd_gym.training.callbacks import CheckpointSaver, Evaluator, MonitorLog
+    from lgmd_gym.training.returns import ReturnTable, progress_bar
 
     frequency = max(config.eval_freq // config.n_envs, 1)
     evaluator = Evaluator(eval_envs, folder, frequency, config.eval_episodes)
     evaluator.restore(model)
-    return [CheckpointSaver(folder, frequency), evaluator, MonitorLog(folder, config.env_id)]
+    saver, log = CheckpointSaver(folder, frequency), MonitorLog(folder, config.env_id)
+    callbacks: list[BaseCallback] = [saver, evaluator, log]
+    if not progress:
+        yield callbacks
+        return
+    with progress_bar(config.n_timesteps) as show:
+        evaluator.show = show
+        yield [*callbacks, ReturnTable(config, evaluator, show)]

@@ -12,6 +12,7 @@ import lgmd_gym
 from lgmd_gym.aliases import Values
 from lgmd_gym.camera import BirdsEye
 from lgmd_gym.envs.registration import TRAFFIC_KINDS
+from lgmd_gym.errors import counted
 from lgmd_gym.sensing.channel import make_channels
 from lgmd_gym.training.config import (
     SEED_STRIDE,
@@ -200,7 +201,10 @@ def _record_missing(recordings: RecordingSet, files: Path, origin: Values, progr
     files.mkdir(parents=True, exist_ok=True)
     seeds = recordings.seeds
     description = f"recording {recordings.name}"
-    with tqdm(total=len(seeds), desc=description, unit="episode", disable=not progress) as bar:
+    if progress:
+        tqdm.write(f"{description}: {counted(len(seeds), 'episode')}")
+    disabled = None if progress else True  # None: unless stderr is a terminal
+    with tqdm(total=len(seeds), desc=description, unit="episode", disable=disabled) as bar:
         for start in range(0, len(seeds), FILE_SIZE):
             part, file = seeds[start : start + FILE_SIZE], files / f"{start:06d}.npz"
             if is_complete(file) and check_file(file, origin) == len(part):

@@ -53,7 +53,7 @@ def train(config: TrainConfig, folder: Path, *, progress: bool = False, jobs: in
     Args:
         config: Configuration of the training.
         folder: Training folder; must not exist.
-        progress: Whether to show progress bars.
+        progress: Whether to print mean returns or metrics of epochs, with progress bars on a terminal.
         jobs: Number of processes that record episodes, and of threads that train the networks of an ensemble.
 
     Returns:
@@ -197,13 +197,16 @@ def _train_on_recordings(config: TrainConfig, folder: Path, progress: bool, jobs
     )
     logger = configure(str(folder / "log"), ["csv", "tensorboard"])
     try:
-        with tqdm(total=learner.n_epochs, desc="training", unit="epoch", disable=not progress) as bar:
+        disabled = None if progress else True  # None: unless stderr is a terminal
+        with tqdm(total=learner.n_epochs, desc="training", unit="epoch", disable=disabled) as bar:
 
             def log(epoch: int, metrics: dict[str, float]) -> None:
                 for name, value in metrics.items():
                     logger.record(name, value)
                 logger.dump(epoch)
-                bar.set_postfix({name: f"{value:.2f}" for name, value in metrics.items()})  # pyright: ignore[reportUnknownMemberType]
+                if progress:
+                    texts = ", ".join(f"{name} {value:.3g}" for name, value in metrics.items())
+                    tqdm.write(f"epoch {epoch} of {learner.n_epochs}: {texts}")
                 bar.update(epoch - bar.n)
 
             return learner.learn(train_data, validation_data, log, jobs)

@@ -51,7 +51,18 @@ def test_the_policy_is_an_agent_if_it_can_be_loaded(monkeypatch, installed):
     printed = out.getvalue()
     assert "no-brake – never brakes; its contacts are the threats.\n" in printed
     assert "ttc-oracle – " in printed  # with the first sentence of its docstring
+    assert printed.endswith(
+        "next: lgmd-gym bench --suite r152 --seeds 20 --conditions mixed --agents ttc-oracle\n"
+    )
     assert ('Left out: policy:all-round requires the extra "train"' in printed) is not installed
+
+
+def test_the_next_command_has_the_neuron_of_the_run():
+    out = io.StringIO()
+    agents = ["no-brake", "spike-threshold"]
+    overview.print_overview(rows_of("no-brake", 0), agents, Console(file=out, width=200), "mine:Mine")
+    start = "next: lgmd-gym bench --suite r152 --seeds 20 --conditions mixed"
+    assert out.getvalue().endswith(f"{start} --neuron mine:Mine\n")
 
 
 def test_the_suite_has_the_same_cases_in_both_places():

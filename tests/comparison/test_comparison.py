@@ -183,13 +183,16 @@ def test_document_as_markdown_csv_json_and_html(tmp_path):
     )
     hidden = DataTable("h", ("n",), [(3,)], hidden=True)
     section = Section("One", "First.\n\nSecond.", (table, Figure("f.png", "A figure."), hidden))
-    Document("Title", "Text.", (section,)).write(tmp_path)
+    (tmp_path / "f.png").write_bytes(b"PNG")
+    Document("Title", "Text of `a<b`.", (section,)).write(tmp_path)
     assert "| a<b | 1.2 |" in (tmp_path / "report.md").read_text()
     assert "| name | x \\| y |\n| --- | ---: |" in (tmp_path / "report.md").read_text()
     page = (tmp_path / "report.html").read_text()
     assert "a&lt;b" in page
-    assert '<img src="f.png"' in page
+    assert '<img src="data:image/png;base64,UE5H" alt="A figure."' in page
     assert "<p>Second.</p>" in page
+    assert "<p>Text of <code>a&lt;b</code>.</p>" in page
+    assert page.count("<section") == page.count("</section>") == 1
     with (tmp_path / "t.csv").open() as file:
         assert list(csv.reader(file)) == [["name", "x | y"], ["a<b", "1.25"], ["c", ""], ["d", ""]]
     assert json.loads((tmp_path / "results.json").read_text())["h"] == [{"n": 3}]
@@ -208,9 +211,10 @@ def test_the_command_writes_a_report(tmp_path, monkeypatch, capsys):
         frames = list(rng.integers(0, 256, (60, 32, 40), np.uint8))
         write_lossless(tmp_path / "clips" / f"{name}.mkv", frames)
     Path("crashes.csv").write_text("clip,crash_frame\none,50\ntwo,\n")
+    Path("mine.toml").write_text("shape = [45, 80]\nhfov_deg = 25.0\n")
     text = (
         "neurons compare difference edges --quick --suites r152 --seeds 1 --clips clips "
-        "--crashes crashes.csv --test-world 6200 --out run"
+        "--crashes crashes.csv --camera mine.toml --test-world 6200 --out run"
     )
     command = text.split()
     assert cli.run(command) == 0
@@ -225,6 +229,9 @@ def test_the_command_writes_a_report(tmp_path, monkeypatch, capsys):
         "Cost",
     ):
         assert f"\n## {title}\n" in report
+    assert report.count("through the camera `mine`") == 2
+    camera = {"name": "mine", "shape": [45, 80], "hfov_deg": 25.0}
+    assert json.loads(Path("run/run.json").read_text())["camera"] == camera
     results = json.loads(Path("run/results.json").read_text())
     assert {row["neuron"] for row in results["froc_validation"]} == {"difference", "edges"}
     assert len(results["closed_loop_test"]) == 2
@@ -243,12 +250,20 @@ def test_the_command_writes_a_report(tmp_path, monkeypatch, capsys):
         (["compare", "--parts", "cots"], "unknown part 'cots'; did you mean 'cost'?"),
         (["compare", "--crashes", "x.csv"], "--clips and --crashes must be used together"),
         (["compare", "--camera", "fova"], "did you mean 'fovea'?"),
+        (["compare", "--camera", "none.toml"], "camera file 'none.toml' cannot be read"),
+        (
+            ["compare", "--camera", "two.toml"],
+            "--camera 'two.toml' has 2 cameras, but all models are behind one",
+        ),
+        (["compare", "--camera", "columns.toml"], "columns"),
         (["compare", "--quik"], "did you mean --quick?"),
         (["list", "--module", "no_such_module"], "cannot be imported"),
     ],
 )
 def test_wrong_arguments_are_one_line(arguments, message, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    Path("two.toml").write_text("[[camera]]\nname = 'a'\n[[camera]]\nname = 'b'\n")
+    Path("columns.toml").write_text("columns = 8\ncamera = 'fovea'\n")
     assert cli.run(["neurons", *arguments]) == 2
     error = capsys.readouterr().err
     assert message in error

@@ -11,8 +11,9 @@ from support.rows import threat_row
 
 import lgmd_gym  # noqa: F401  (registers the ids)
 from lgmd_gym.benchmark.config import RunConfig
+from lgmd_gym.neuron import registry
 from lgmd_gym.report.frames import WIDE, frame_uri
-from lgmd_gym.report.sections import ReportData
+from lgmd_gym.report.sections import ReportData, own_signal
 
 
 def replay(case, suite="quick", world=8003, **config):
@@ -38,6 +39,32 @@ def test_an_own_suite_is_the_copy_in_the_run_folder(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text('name = "mine"\n[[cases]]\nfamily = "CCRs"\nspeeds_kmh = [30]\n')
     assert "drive suite.toml --case mine/CCRs/v30 --agent" in replay("mine/CCRs/v30", str(path))
+
+
+def test_the_page_states_where_the_commands_run(tmp_path):
+    def place(suite, agents=("spike-threshold",), neuron=None):
+        config = RunConfig(suite=suite, agents=agents, neuron=neuron)
+        return ReportData("", config, {}, config.get_suite(), [], list(agents), False).replay_place
+
+    path = tmp_path / "mine.toml"
+    path.write_text('name = "mine"\n[[cases]]\nfamily = "CCRs"\nspeeds_kmh = [30]\n')
+    assert place("quick") == "in any folder"
+    assert place("quick", ("my_agent:Mine",)) == "in the folder of your modules"
+    assert place("quick", neuron="off-only:t_sp=0.78") == "in any folder"
+    assert place(str(path)) == "in the run folder"
+    own = place(str(path), ("my_agent:Mine",))
+    assert own == "in the run folder, with the folder of your modules in PYTHONPATH"
+
+
+def test_the_signal_of_an_own_neuron_is_named_whether_or_not_it_is_loaded(monkeypatch):
+    def signal(neuron):
+        return own_signal(RunConfig(suite="quick", neuron=neuron))
+
+    assert signal(None) == signal("off-only") == signal("off-only:t_sp=0.78") == ""
+    neuron = "my_neuron:Mine:sigma=2"
+    assert signal(neuron) == neuron
+    monkeypatch.setitem(registry._MODELS, "my_neuron:Mine", registry._MODELS["difference"])
+    assert signal(neuron) == neuron
 
 
 @pytest.mark.parametrize(

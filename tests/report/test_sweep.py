@@ -6,7 +6,8 @@ from support.rows import threat_row
 from lgmd_gym.benchmark.config import RunConfig
 from lgmd_gym.benchmark.plan import make_plan
 from lgmd_gym.benchmark.suites import copy_suite, load_suite
-from lgmd_gym.report.sweep import band, sweep_grids
+from lgmd_gym.report.conclusion import conclusion
+from lgmd_gym.report.sweep import band, sweep_grids, sweep_sentences, swept_arguments
 
 SUITE = """
 name = "mine"
@@ -63,6 +64,42 @@ def test_the_grid_has_the_first_two_arguments_over_all_others(suite):
     contact = grid.lines[1][1][0]
     assert (contact.contacts, contact.premature, contact.runs, contact.letter) == (2, 0, 4, False)
     assert contact.tooltip.startswith("2 of 4 good; 4 threats, contact in 2, premature braking in 0")
+
+
+def test_the_conclusion_names_the_argument_with_the_widest_spread(suite):
+    """8 rows per value: good are 8 at 36 km/h, 2 at 72 km/h; 6 at a gap of 6 m, 4 at 8 m; 5 at each shade."""
+    rows = rows_of(suite)
+    sentence = "In CutIn, a varies most with ego_speed: good in 8 of 8 at 36 km/h, 2 of 8 at 72 km/h."
+    assert sweep_sentences(rows, "a", suite.by_name) == [sentence]
+    complete = [row | {"speed_reduction": 1.0} for row in reversed(rows)]
+    assert sentence in conclusion(complete, ["no-brake", "a"], suite)[1]
+    assert sweep_sentences(rows, "b", suite.by_name) == []
+    good = [row | {"avoided": True} for row in rows]
+    assert sweep_sentences(good, "a", suite.by_name) == []  # nothing varies
+    failed = [row | {"error": "x"} for row in rows]
+    assert sweep_sentences(failed, "a", suite.by_name) == []
+
+
+def test_of_many_values_the_best_and_the_worst_are_named(tmp_path):
+    path = tmp_path / "many.toml"
+    path.write_text('name = "many"\n[[cases]]\nfamily = "CCRs"\nsweep.overlap = [0.2, 0.4, 0.6, 0.8, 1.0]\n')
+    suite = load_suite(path)
+    outcomes = [(True, True), (True, False), (False, False), (True, False), (True, False)]
+    rows = [
+        threat_row("a", case.name, seed, family="CCRs", avoided=avoided)
+        for case, of_case in zip(suite.cases, outcomes, strict=True)
+        for seed, avoided in enumerate(of_case)
+    ]
+    (sentence,) = sweep_sentences(rows, "a", suite.by_name)
+    best, worst = (dict(suite.cases[index].swept)["overlap"] for index in (0, 2))
+    assert (best, worst) == ("overlap0.2", "overlap0.6")
+    assert sentence == "In CCRs, a varies most with overlap: good in 2 of 2 at 0.2, 0 of 2 at 0.6."
+
+
+def test_arguments_have_the_meaning_of_the_docstring(suite):
+    meanings = dict(swept_arguments(suite))
+    assert list(meanings) == ["ego_speed", "gap", "shade"]
+    assert meanings["gap"] == "Bumper-to-bumper distance at the start of the lane change"
 
 
 def test_a_sweep_of_one_argument_is_one_line_and_a_word_has_no_unit(tmp_path):

@@ -46,12 +46,15 @@ def test_trained_policy_acts_as_the_model_predicts(tmp_path, capsys, demands, la
 
     text = YAML.replace("repeat: 4", "repeat: 4, latch: true") if latch else YAML
     config = online_config(tmp_path, text=text, demands=demands, seed=1)
-    path = train(config, tmp_path / "run")
+    path = train(config, tmp_path / "run", progress=True)
+    rows = capsys.readouterr().out.splitlines()[2:]
+    with np.load(tmp_path / "run" / "best" / "evaluations.npz") as log:
+        means = [f"{mean:.2f}" for mean in log["results"].mean(axis=1)]
+    assert [row.split()[2] for row in rows if int(row.split()[0]) in (32, 64)] == means
     assert path.stat().st_size < 1_000_000
     card = read_card(path)
     assert card["camera"] == "fovea"
     assert card["features"]["repeat"] == 4
-    capsys.readouterr()
     agent = make_agent(f"policy:{path}")
     assert capsys.readouterr().err == ""  # the card describes the network, so that nothing is unpickled
     model = PPO.load(path, device="cpu")

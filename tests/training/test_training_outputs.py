@@ -13,6 +13,7 @@ from lgmd_gym.cli import main as cli
 from lgmd_gym.training import TrainConfig, train
 from lgmd_gym.training.callbacks import MonitorLog
 from lgmd_gym.training.model_card import best_result, write_model_card
+from lgmd_gym.training.returns import ReturnTable
 
 YAML = """
 LGMD/CCRs-v0:
@@ -147,3 +148,65 @@ def test_an_interrupted_training_states_what_is_kept(saved, kept, tmp_path, monk
     assert cli.run(["train", "--out", str(tmp_path / "run")]) == 130
     message = f"interrupted; {kept}: lgmd-gym train --resume {tmp_path / 'run'}\n"
     assert capsys.readouterr().err.endswith(message)
+
+
+def test_a_run_prints_its_mean_returns_in_the_scale_of_the_environment(tmp_path, capsys):
+    """64 decisions: a row every 3, and one at each evaluation; the training return is divided by 0.1."""
+    text = YAML.replace("latch: true", "latch: true, reward_scale: 0.1").replace(
+        "n_timesteps: 32", "n_timesteps: 64"
+    )
+    config = TrainConfig.from_hyperparams(
+        "ppo", "LGMD/CCRs-v0", write_yaml(tmp_path, text), camera="fovea", eval_freq=16, eval_episodes=3
+    )
+    shown = []
+    evaluator = SimpleNamespace(evaluations_timesteps=[], last_mean_reward=-np.inf, best_mean_reward=-np.inf)
+    table = ReturnTable(config, evaluator, lambda done, activity: shown.append((done, activity)))
+    table.model = SimpleNamespace(ep_info_buffer=[])
+    table.num_timesteps = 0
+    table._on_training_start()
+    for decisions, returns, validation in (
+        (2, [], None),
+        (4, [-0.2, 0.1], None),
+        (6, [1.0], -1.5),
+        (8, [1.0], -2.0),
+    ):
+        table.num_timesteps, table.model.ep_info_buffer = decisions, [{"r": value} for value in returns]
+        if validation is not None:
+            evaluator.evaluations_timesteps.append(decisions)
+            evaluator.last_mean_reward = validation
+            evaluator.best_mean_reward = max(validation, evaluator.best_mean_reward)
+        table._on_step()
+    first, headings, *rows = capsys.readouterr().out.splitlines()
+    assert first == ("ppo in 2 environments LGMD/CCRs-v0: 64 decisions, an evaluation of 3 episodes every 16")
+    assert headings.split("  ") == ["decisions", "training return", "validation return", "decisions/s"]
+    found = [row.split() for row in rows]
+    assert [row[:2] for row in found] == [["4", "-0.50"], ["6", "10.00"], ["8", "10.00"]]
+    assert [row[2] for row in found[1:]] == ["-1.50", "-2.00"]
+    assert [row[4:] for row in found] == [[], ["best", "so", "far"], []]
+    assert shown == [(2, "training"), (4, "training"), (6, "training"), (8, "training")]
+
+
+def test_a_resumed_run_prints_where_it_continues(tmp_path, capsys):
+    config = TrainConfig.from_hyperparams(
+        "ppo", "LGMD/CCRs-v0", write_yaml(tmp_path, YAML), camera="fovea", eval_freq=16, eval_episodes=1
+    )
+    evaluator = SimpleNamespace(evaluations_timesteps=[16], last_mean_reward=-1.0, best_mean_reward=-1.0)
+    table = ReturnTable(config, evaluator, lambda done, activity: None)
+    table.model, table.num_timesteps = SimpleNamespace(ep_info_buffer=None), 16
+    table._on_training_start()
+    table.num_timesteps = 18
+    table._on_step()
+    first, _, row = capsys.readouterr().out.splitlines()
+    assert first.startswith(
+        "ppo in 2 environments LGMD/CCRs-v0: 32 decisions, from 16 on, an evaluation of 1 ep"
+    )
+    assert row.split()[:2] == ["18", "-"]  # no episode has ended
+
+
+def test_an_interruption_before_the_folder_exists(tmp_path, monkeypatch, capsys):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("lgmd_gym.engine.first_use.compile_kernels", interrupted)
+    assert cli.run(["train", "--out", str(tmp_path / "run")]) == 130
+    assert capsys.readouterr().err.endswith("interrupted; nothing was saved\n")
