@@ -11,7 +11,7 @@ from pathlib import Path
 
 from comparison import DriveValues, clip_values, common_optics, compare, simulated_values
 from drives import Drives, Optics, simulated_drives
-from results import comparison_tables, realism_figure, summary_line, write_comparisons
+from report import comparison_tables, realism_figure, summary_line, write_comparisons
 
 from lgmd_gym.camera.worlds import SPLIT_WORLDS
 from lgmd_gym.cli import clips
