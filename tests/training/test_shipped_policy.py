@@ -14,7 +14,7 @@ from support.policies import random_inputs, write_policy
 from lgmd_gym.agents import make_agent, make_agents
 from lgmd_gym.agents.policies.card import read_card
 from lgmd_gym.agents.policies.policy import action_values, find_policy
-from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS, all_round_cameras
+from lgmd_gym.agents.sides import all_round_cameras
 from lgmd_gym.training import TrainConfig
 
 
@@ -70,20 +70,20 @@ def test_policy_brakes_for_a_car_and_not_on_an_empty_road(scenario):
     assert not info["collision"]
 
 
-@pytest.mark.parametrize("acceleration", [3.0, 0.5, -3.0])
-def test_policy_does_not_react_to_own_acceleration(acceleration):
+def test_policy_does_not_react_to_own_braking():
+    """The driver brakes for the traffic of a merge."""
     agent = make_agent("policy:all-round")
-    times = np.arange(0.0, 8.0, 1 / 30)
-    for speed in (0.0 if acceleration > 0 else 24.0) + acceleration * times:
-        observation = {
-            "ffi": np.ones(NUM_ALL_ROUND, np.float32),
-            "column_potential": np.full(NUM_COLUMNS, 0.5, np.float32),
-            "ego_speed": np.array([speed], np.float32),
-            "ego_acceleration": np.array([acceleration], np.float32),
-            "ego_yaw_rate": np.zeros(1, np.float32),
-            "known_deceleration": np.array([7.5], np.float32),
-        }
-        assert agent.act(observation, {})[0] == 0.0
+    env = gym.make("LGMD/Traffic-Merge-v0", camera=agent.camera, split="test")
+    observation, info = env.reset(seed=1)
+    agent.reset(1)
+    accelerations: list[float] = []
+    for _ in range(450):
+        action = agent.act(observation, info)
+        assert action[0] == 0.0
+        observation, _, terminated, _, info = env.step(action)
+        assert not terminated
+        accelerations.append(float(observation["ego_acceleration"][0]))
+    assert min(accelerations) < -2.0
 
 
 def test_a_margin_shifts_the_log_odds_of_braking(tmp_path):
