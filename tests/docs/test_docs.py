@@ -105,7 +105,7 @@ def make_clip(path):
 def write_file(path, block, folder):
     """Write a block to a file if the page introduces it with "Write `name.py`:"; return whether it does."""
     before = path.read_text().split(block)[0]
-    named = re.search(r"Write `(\w+\.(py|toml))`:\s*```\w+\n$", before)
+    named = re.search(r"Write\s`(\w+\.(py|toml))`:\s*```\w+\n$", before)
     if named:
         (folder / named[1]).write_text(block)
     return bool(named)
