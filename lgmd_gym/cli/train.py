@@ -76,12 +76,13 @@ class Train:
 
 def run(options: Train) -> int:
     """Train a policy, or resume a training run, and print the path of the policy."""
+    if options.resume is not None:
+        refuse_unused(options, ("resume", "jobs"))
+    _check_installed()  # the modules below require the extra
+
     from lgmd_gym.engine.first_use import compile_kernels
     from lgmd_gym.training import resume, train
 
-    if options.resume is not None:
-        refuse_unused(options, ("resume", "jobs"))
-    _check_installed()
     folder = options.resume or default_out(options.out, f"train-{options.algo}")
     config = None if options.resume is not None else config_of(options)
     try:

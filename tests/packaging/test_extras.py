@@ -64,3 +64,10 @@ def test_commands_state_how_to_install_what_is_missing(
     message = capsys.readouterr().err
     assert message.count("\n") == 1
     assert message.endswith(f'requires the extra "{extra}": pip install -e ".[{extra}]"\n')
+
+
+def test_train_checks_its_extra_before_it_loads_the_modules_of_it(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "stable_baselines3", None)
+    monkeypatch.setitem(sys.modules, "lgmd_gym.training", None)
+    assert cli.run(["train"]) == 2
+    assert 'training requires the extra "train"' in capsys.readouterr().err
