@@ -31,7 +31,7 @@ class Emergencies:
     """The emergencies of an episode without braking by the agent."""
 
     contact: float | None  # time of the ego's contact [s]; None without contact
-    # times of decisions with a required deceleration of `EMERGENCY` or more, ascending [s]
+    # times of decisions with a required deceleration of an emergency, ascending [s]
     demanding: tuple[float, ...]
 
     def time_until(self, time: float, horizon: float = HORIZON) -> float | None:
@@ -44,21 +44,24 @@ class Emergencies:
         return max(following - time, 0.0) if following - time <= horizon + tolerance else None
 
 
-def simulate_driver(env: TrafficEnv, time: float, horizon: float = HORIZON) -> Emergencies:
+def simulate_driver(
+    env: TrafficEnv, time: float, horizon: float = HORIZON, threshold: float = EMERGENCY
+) -> Emergencies:
     """Continue an episode without the agent, even past its end, and return the emergencies.
 
     Args:
         env: The environment, left in the final state and with its road-step callback removed.
         time: Current time [s].
         horizon: Simulated time [s].
+        threshold: Required deceleration of an emergency [m/s²].
     """
     vars(env.road).pop("step", None)  # the callback of `on_road_step` would render camera frames
     policy_hz = env.config["policy_frequency"]
-    demanding = [time] if env.required_deceleration >= EMERGENCY else []
+    demanding = [time] if env.required_deceleration >= threshold else []
     for step in range(1, round(horizon * policy_hz) + 1):
         if env.road.contact is not None:
             return Emergencies(time + (step - 1) / policy_hz, tuple(demanding))
         env.step_unobserved()
-        if env.required_deceleration >= EMERGENCY:
+        if env.required_deceleration >= threshold:
             demanding.append(time + step / policy_hz)
     return Emergencies(time + horizon if env.road.contact is not None else None, tuple(demanding))

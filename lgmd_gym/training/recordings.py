@@ -12,6 +12,7 @@ import lgmd_gym
 from lgmd_gym.aliases import Values
 from lgmd_gym.camera import BirdsEye
 from lgmd_gym.envs.registration import TRAFFIC_KINDS
+from lgmd_gym.envs.traffic.emergencies import HORIZON
 from lgmd_gym.errors import counted
 from lgmd_gym.sensing.channel import make_channels
 from lgmd_gym.training.config import (
@@ -104,7 +105,7 @@ def _traffic_set(
     params = config.env_kwargs.get("params")
     record = TrafficRecorder(split, config.camera, traffic.names, params).record
     name = f"extra-traffic{number}-{split}" if number else f"traffic-{split}"
-    settings = {"kinds": list(traffic.names)} if number else {}
+    settings: Values = {"horizon_s": HORIZON} | ({"kinds": list(traffic.names)} if number else {})
     return RecordingSet(name, seeds, record, option, settings, CHUNK_SIZE)
 
 

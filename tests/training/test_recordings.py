@@ -14,9 +14,9 @@ from lgmd_gym.training.offline.episodes import _difference, check_file, load, sa
 from lgmd_gym.training.recordings import check_recordings, load_or_record, origin_of, recording_sets
 
 
-def write_episodes(folder, config, by_seed):
+def write_episodes(folder, config, by_seed, settings=None):
     folder.mkdir(parents=True, exist_ok=True)
-    save(by_seed, folder / f"{len(list(folder.iterdir()))}.npz", origin_of(config))
+    save(by_seed, folder / f"{len(list(folder.iterdir()))}.npz", origin_of(config) | (settings or {}))
 
 
 def test_files_restore_every_episode(tmp_path):
@@ -141,7 +141,7 @@ def test_traffic_recordings_are_required_in_addition(tmp_path):
         check_recordings(config)
     for name in ("traffic-train", "traffic-validation"):
         by_seed = [[], [synthetic_episode(), synthetic_episode()], []]
-        write_episodes(tmp_path / "episodes" / name, config, by_seed)
+        write_episodes(tmp_path / "episodes" / name, config, by_seed, {"horizon_s": 3.0})
     with pytest.raises(ValueError, match="traffic-train' holds 3 episodes, 9 are required"):
         check_recordings(config)
     check_recordings(replace(config, traffic_episodes=3))
@@ -165,7 +165,7 @@ def test_extra_traffic_has_seeds_and_kinds_of_its_own(tmp_path):
     assert min(seeds) >= 10_000  # the traffic suite uses the seeds from 0 on
     extra = traffic["extra-traffic1-train"]
     assert extra.record.__self__.kinds == ("merge", "two-way")
-    assert extra.settings == {"kinds": ["merge", "two-way"]}
+    assert extra.settings == {"horizon_s": 3.0, "kinds": ["merge", "two-way"]}
     assert traffic["traffic-train"].record.__self__.kinds == tuple(TRAFFIC_KINDS)
     assert extra.option == " --extra-traffic 9:merge,two-way 4:merge"
 

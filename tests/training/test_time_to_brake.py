@@ -1,5 +1,6 @@
 """Driven episodes, and policies that learn the time to brake from them."""
 
+from dataclasses import replace
 from math import inf
 
 import gymnasium as gym
@@ -179,6 +180,41 @@ def test_an_ensemble_learns_the_intervals_with_any_number_of_threads():
     assert logits.logits.argmax(1).tolist() == [0, 1, 2]  # 4, 15 and 36 m/s
 
 
+def test_decisions_in_traffic_have_a_weight():
+    """Nothing tells both kinds of episodes apart: the odds are those of the weights."""
+    speed, times = np.full((30, 1), 20.0, np.float32), np.zeros(30, np.float32)
+    threat = DrivenEpisode({"ego_speed": speed}, times, np.zeros(30, np.float32), True)
+    traffic = replace(threat, time_to_brake=np.full(30, np.inf, np.float32), threat=False, family="traffic")
+    dataset = StateDataset(
+        [threat, traffic], FeatureConfig(inputs=("ego_speed",), history=1, repeat=1), (1.0, 2.0)
+    )
+    assert dataset.in_traffic.tolist() == [False] * 30 + [True] * 30
+    options = {
+        "n_epochs": 300,
+        "batch_size": 60,
+        "weight_decay": 0.0,
+        "dropout": 0.0,
+        "traffic_weight": 3.0,
+        "learning_rate": 0.05,
+    }
+    losses = []
+    learner = TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=BRAKE, **options)
+    learner.learn(dataset, dataset, lambda _, metrics: losses.append(metrics["loss"]))
+    assert learner.odds(dataset)[:, 0] == pytest.approx(-np.log(3.0), abs=0.02)
+    assert losses[-1] == pytest.approx(-0.25 * np.log(0.25) - 0.75 * np.log(0.75), abs=0.03)
+
+
+@pytest.mark.parametrize("dtype", ["float32", "bfloat16"])
+def test_gradient_steps_in_bfloat16_are_those_of_rounded_products(dtype):
+    learner = TimeToBrakeLearner(
+        "MultiInputPolicy", Blank(), brake=BRAKE, n_epochs=12, batch_size=32, bfloat16=dtype == "bfloat16"
+    )
+    epochs = []
+    model = learner.learn(speeds(60, 0), speeds(20, 1), lambda _, metrics: epochs.append(metrics))
+    assert epochs[-1]["area"] > 0.99
+    assert {value.dtype for value in model.policy.parameters()} == {torch.float32}
+
+
 @pytest.mark.filterwarnings("ignore:invalid value encountered")
 def test_a_training_that_diverges():
     learner = TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=BRAKE, n_epochs=1, learning_rate=1e30)
@@ -233,6 +269,10 @@ def test_training_writes_a_policy_with_a_brake(tmp_path):
         ({"text": YAML.replace("history: 1", "history: 1, latch: true")}, "requires latch: false"),
         ({"text": YAML.replace("n_epochs", "epochs")}, "n_epochs"),
         ({"text": YAML.replace("full_odds", "full_odd")}, "full_odds"),
+        (
+            {"text": YAML.replace("n_epochs: 2", "traffic_weight: 0")},
+            "traffic_weight must be a number > 0, got 0",
+        ),
         ({"text": YAML.replace("history: 1", "history: 2")}, "requires history: 1"),
         ({"n_envs": 2}, "n_envs has no effect with algo 'time-to-brake', got 2; omit it"),
         ({"text": YAML.replace("history: 1", "history: 1, reward_scale: 0.1")}, "reward_scale has no .*0.1"),

@@ -35,13 +35,13 @@ def test_long_stretches_are_divided_evenly():
     ("emergencies", "expected_starts"),
     [
         (Emergencies(None, ()), [0.0, 10.0, 20.0]),
-        (Emergencies(41.0, ()), [0.0, 10.0, 20.0]),  # more than 10 s after the end
-        (Emergencies(39.0, ()), [0.0, 9.67, 19.33]),
-        (Emergencies(None, (15.0, 15.1)), [0.0, 15.13, 22.57]),
-        (Emergencies(None, (5.0, 25.0)), [5.03, 25.03]),
+        (Emergencies(33.1, ()), [0.0, 10.0, 20.0]),  # more than 3 s after the end
+        (Emergencies(32.0, ()), [0.0, 9.67, 19.33]),
+        (Emergencies(None, (15.0, 15.1)), [0.0, 6.0, 15.13, 22.57]),
+        (Emergencies(None, (3.0, 25.0)), [3.03, 12.53, 25.03]),
     ],
 )
-def test_segments_exclude_the_ten_seconds_before_an_emergency(monkeypatch, emergencies, expected_starts):
+def test_segments_exclude_the_three_seconds_before_an_emergency(monkeypatch, emergencies, expected_starts):
     observations = [{"ego_speed": np.array([decision / 30.0], np.float32)} for decision in range(900)]
     monkeypatch.setattr(traffic, "run_episode", lambda *_: (observations, emergencies))
     (segments,) = TrafficRecorder("train", "fovea").record(range(1))
@@ -49,7 +49,7 @@ def test_segments_exclude_the_ten_seconds_before_an_emergency(monkeypatch, emerg
     times = [segment.observations["ego_speed"][:, 0] for segment in segments]
     assert [float(part[0]) for part in times] == pytest.approx(expected_starts, abs=0.01)
     for time in np.concatenate(times):
-        assert emergencies.time_until(float(round(time * 30) / 30), 10.0) is None
+        assert emergencies.time_until(float(round(time * 30) / 30)) is None
 
 
 @pytest.mark.parametrize("seed", [HIGHWAY, pytest.param(INTERSECTION, marks=pytest.mark.slow)])
@@ -82,14 +82,17 @@ def test_successive_seeds_have_the_kinds_in_turn(monkeypatch):
 
 
 def test_emergencies_equal_those_of_the_benchmark():
-    """The episode has emergencies before and after its end."""
-    kind, seed, config = "intersection", 8, {"duration": 4.5}
-    recording = Recorded(kind, seed, config=config).recording
-    env = traffic.make_traffic(kind, camera="fovea", config=config)
+    """The episode has emergencies before and after its end, and the brake of a world."""
+    kind, seed, config, world = "intersection", 8, {"duration": 4.5}, 0
+    recording = Recorded(kind, seed, config=config, appearance=Appearance(world=world)).recording
+    assert recording.scaled_emergency < 4.3
+    env = traffic.make_traffic(kind, camera="fovea", config=config, world=world)
     contact, times = astuple(run_episode(env, seed)[1])
     assert min(times) < 4.5 < max(times)
     assert contact is None
-    assert recording.emergencies == Emergencies(None, tuple(time for time in times if time <= 7.5 + 1e-9))
+    assert recording.scaled_emergencies == Emergencies(
+        None, tuple(time for time in times if time <= 7.5 + 1e-9)
+    )
 
 
 def observations_of(env, seed=0):
@@ -147,6 +150,15 @@ def test_a_contact_after_the_end_of_the_drive_is_no_threat(monkeypatch, contact,
     monkeypatch.setattr(traffic, "threat_episode", lambda *_: "threat")
     (segments,) = TrafficRecorder("train", "fovea", ("inattentive-highway",)).record(range(1))
     assert segments.count("threat") == threats
+
+
+def test_the_last_ten_seconds_before_a_contact_are_no_segment_without_threat(monkeypatch):
+    observations = [{"ego_speed": np.array([decision / 30.0], np.float32)} for decision in range(900)]
+    monkeypatch.setattr(traffic, "run_episode", lambda *_: (observations, Emergencies(30.0, ())))
+    monkeypatch.setattr(traffic, "threat_episode", lambda *_: None)
+    (segments,) = TrafficRecorder("train", "fovea", ("inattentive-highway",)).record(range(1))
+    assert sum(map(len, segments)) == 600
+    assert max(float(segment.observations["ego_speed"].max()) for segment in segments) < 20.0
 
 
 def test_a_twin_that_does_not_repeat_the_contact_is_rejected():

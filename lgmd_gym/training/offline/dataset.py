@@ -31,7 +31,7 @@ from lgmd_gym.agents.sides import (
     NUM_SIDE_FIELDS,
     SIDE_COLUMNS,
 )
-from lgmd_gym.training.offline.episodes import DrivenEpisode, Observation
+from lgmd_gym.training.offline.episodes import TRAFFIC, DrivenEpisode, Observation
 
 EPISODES_AT_ONCE = 16  # whose inputs are computed together
 EVEN = (
@@ -57,6 +57,7 @@ class StateDataset:
         features: Inputs side by side, float16, (M, features).
         classes: Index of the interval, int64, (M,).
         braking: Whether the agent braked before the decision, bool, (M,).
+        in_traffic: Whether the episode is one of traffic, bool, (M,).
     """
 
     def __init__(
@@ -64,7 +65,7 @@ class StateDataset:
     ) -> None:
         self.names = sorted(features.inputs)
         tables: list[np.ndarray] = []
-        times, demands = list[np.ndarray](), list[np.ndarray]()
+        times, demands, in_traffic = list[np.ndarray](), list[np.ndarray](), list[np.ndarray]()
         self.sizes: list[int] = []
         remaining = iter(episodes)
         while group := list(islice(remaining, EPISODES_AT_ONCE)):
@@ -75,9 +76,13 @@ class StateDataset:
             times += [episode.time_to_brake[:: features.repeat] for episode in group]
             before = [np.concatenate([[HOLD], episode.demands[:-1]]) for episode in group]
             demands += [values[:: features.repeat] for values in before]
+            in_traffic += [
+                np.full(-(-len(episode) // features.repeat), episode.family == TRAFFIC) for episode in group
+            ]
         self.features = _joined(tables)
         self.classes = np.digitize(np.concatenate(times), limits_s)
         self.braking = np.concatenate(demands) < HOLD
+        self.in_traffic = np.concatenate(in_traffic)
 
     def __len__(self) -> int:
         return len(self.classes)

@@ -1,8 +1,8 @@
 """Segments of episodes in traffic, without a threat and, with drivers who err, before a contact.
 
 Levels last seconds and contain little driving without an event: following, oncoming cars, starting. Traffic
-episodes add it. Segments far from any emergency are kept; there, no contact follows, and the time to brake is
-infinite.
+episodes add it. Segments are kept in which the benchmark would call a brake needless: no emergency follows
+within `HORIZON`, see `lgmd_gym.envs.traffic.emergencies`. There, the time to brake is infinite.
 
 With inattentive drivers, the last seconds before a contact that braking avoids are kept, too. The last
 decision from which braking avoids it comes from replays of the traffic without sensors. The agent never
@@ -26,10 +26,13 @@ from lgmd_gym.benchmark.task import NO_BRAKE
 from lgmd_gym.benchmark.traffic.branch import fork
 from lgmd_gym.camera.scene import WEATHERS
 from lgmd_gym.envs.attention import INATTENTIVE
-from lgmd_gym.envs.dynamics.brake import EMERGENCY
 from lgmd_gym.envs.families.distribution import draw_weather
 from lgmd_gym.envs.registration import TRAFFIC_KINDS, make_traffic
-from lgmd_gym.envs.traffic.emergencies import Emergencies, simulate_driver
+from lgmd_gym.envs.traffic.emergencies import (
+    EMERGENCY_SHARE,
+    Emergencies,
+    simulate_driver,
+)
 from lgmd_gym.envs.traffic.env import JAM_SPEED, TrafficEnv
 from lgmd_gym.neuron import NeuronSpec
 from lgmd_gym.sensing.channel import ChannelSpec
@@ -41,7 +44,6 @@ from lgmd_gym.training.offline.episodes import (
     stack,
 )
 
-MARGIN = 10.0  # segments end this time before an emergency [s]
 MAX_LENGTH = 10.0  # longest segment [s]; levels last 7 s in the median and 22 s at most
 MIN_LENGTH = 1.0  # shortest stretch without an emergency that is kept [s]
 STRIDE = 6  # largest distance of two replays [decisions], 0.2 s at 30 Hz
@@ -49,7 +51,7 @@ STRIDE = 6  # largest distance of two replays [decisions], 0.2 s at 30 Hz
 
 @dataclass(frozen=True)
 class TrafficRecorder:
-    """Records segments of traffic episodes far from any emergency; the seed selects the kind of traffic."""
+    """Records segments of traffic episodes; the seed selects the kind of traffic."""
 
     split: str  # "train" or "validation"; light, weather and ground texture are drawn as for its levels
     camera: ChannelSpec  # see `LGMDObservation`
@@ -81,13 +83,16 @@ class TrafficRecorder:
             env.close()
         policy_hz = base.config["policy_frequency"]
         times = np.arange(len(observations)) / policy_hz
-        non_threat = [emergencies.time_until(time, MARGIN) is None for time in times.tolist()]
+        non_threat = [emergencies.time_until(time) is None for time in times.tolist()]
+        # a later contact is beyond the episode's end
+        crashes = erring and bool(observations) and emergencies.contact == len(observations) / policy_hz
+        if crashes:  # the last decisions are those of `threat_episode`
+            non_threat[-round(MAX_LENGTH * policy_hz) :] = []
         segments = [
             _segment(observations[first:last], np.full(last - first, inf))
             for first, last in segment_bounds(non_threat, policy_hz)
         ]
-        # a later contact is beyond the episode's end
-        if erring and observations and emergencies.contact == len(observations) / policy_hz:
+        if crashes:
             threat = threat_episode(make(camera=None), seed, observations)
             segments += [] if threat is None else [threat]
         return segments
@@ -96,6 +101,8 @@ class TrafficRecorder:
 def run_episode(env: gym.Env, seed: int) -> tuple[list[Observation], Emergencies]:
     """Run a traffic episode without braking and return its observations and emergencies.
 
+    The emergencies are scaled to the brake of the episode, as for needless activations in the benchmark.
+
     Args:
         env: Traffic environment; it is advanced beyond the episode's end to find later emergencies.
         seed: Seed of the reset.
@@ -103,14 +110,16 @@ def run_episode(env: gym.Env, seed: int) -> tuple[list[Observation], Emergencies
     base: Any = env.unwrapped
     observations: list[Observation] = []
     demanding: list[float] = []
-    policy_hz = base.config["policy_frequency"]
+    policy_hz, threshold = base.config["policy_frequency"], inf
     for step, _ in rollout(env, make_agent(NO_BRAKE), seed):
+        if threshold == inf:  # the reset draws the brake
+            threshold = EMERGENCY_SHARE * base.brake.max_deceleration
         if step.done:
             break
-        if step.info["required_deceleration"] >= EMERGENCY:
+        if step.info["required_deceleration"] >= threshold:
             demanding.append(len(observations) / policy_hz)
         observations.append(select_signals(step.observation))
-    later = simulate_driver(base, len(observations) / policy_hz, MARGIN)
+    later = simulate_driver(base, len(observations) / policy_hz, threshold=threshold)
     return observations, Emergencies(later.contact, (*demanding, *later.demanding))
 
 
@@ -118,7 +127,7 @@ def segment_bounds(non_threat: list[bool], policy_hz: float) -> list[tuple[int, 
     """Return first and last (exclusive) decision of each segment; a long stretch is divided evenly.
 
     Args:
-        non_threat: Whether no emergency follows within `MARGIN`, for each decision.
+        non_threat: Whether no emergency follows within `HORIZON`, for each decision.
         policy_hz: Decision rate [Hz].
     """
     edges = np.flatnonzero(np.diff([0, *map(int, non_threat), 0])).reshape(-1, 2)
