@@ -68,6 +68,7 @@ def test_the_network_of_the_card_acts_as_the_model(name, tmp_path):
     assert torch.equal(torch.get_rng_state(), state)  # saving a policy does not change the rest of a training
     assert not network.training
     space, actions = spaces.Dict(ego_speed=SPEED, frame=FRAME), []
+    space.seed(0)
     for _ in range(20):
         sample = {key: space[key].sample() for key in model.observation_space.spaces}
         sample["ego_speed"] = rng.normal(size=3).astype(np.float32)

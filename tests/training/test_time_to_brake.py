@@ -181,7 +181,7 @@ def test_an_ensemble_learns_the_intervals_with_any_number_of_threads():
 
 
 def test_decisions_in_traffic_have_a_weight():
-    """Nothing tells both kinds of episodes apart: the odds are those of the weights."""
+    """Nothing distinguishes both kinds of episodes: the odds are those of the weights."""
     speed, times = np.full((30, 1), 20.0, np.float32), np.zeros(30, np.float32)
     threat = DrivenEpisode({"ego_speed": speed}, times, np.zeros(30, np.float32), True)
     traffic = replace(threat, time_to_brake=np.full(30, np.inf, np.float32), threat=False, family="traffic")
