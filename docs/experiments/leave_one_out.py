@@ -2,11 +2,12 @@
 # Not strict: torch and stable-baselines3 state few types.
 """Does a policy recognise threats of a family that its training lacks?
 
-    python docs/experiments/leave_one_out.py runs/all-round --families CutInThreat CPNA CCCscp --jobs 2
+    python docs/experiments/leave_one_out.py runs/all-round --families CutIn CPNA CCCscp --jobs 2
 
-The folder is one of `lgmd-gym train --algo time-to-brake`, with its recorded episodes. Every second training
-level of the families is set aside for the test. One network is trained on all other training episodes, and
-one per family on those without any level of this family. The table has the shares of the tested threats that
+The folder is one of `lgmd-gym train --algo time-to-brake`. A family is that of the recorded scenario: CutIn
+includes the levels of CutInThreat and those without their target. The levels of the families with an odd seed
+are set aside for the test. One network is trained on all other training episodes, and one per family on those
+that are not of this family; nor does it select the epoch. The table has the shares of the tested threats that
 are recognised in time: the log odds of full braking exceed a threshold while full braking still avoids the
 contact, and before the recorded driver brakes. Threats in which the driver brakes earlier than 0.3 s before
 the last moment are left out. The threshold of each network is the one that 5 % of the validation levels
@@ -15,11 +16,10 @@ without a threat exceed.
 
 import argparse
 import json
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from itertools import pairwise
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -33,7 +33,7 @@ from lgmd_gym.training import TrainConfig
 from lgmd_gym.training.offline.dataset import StateDataset
 from lgmd_gym.training.offline.episodes import TRAFFIC, DrivenEpisode
 from lgmd_gym.training.offline.time_to_brake import TimeToBrakeLearner
-from lgmd_gym.training.recordings import load_or_record
+from lgmd_gym.training.recordings import check_recordings, load_or_record, recording_sets
 from lgmd_gym.training.trainer import CONFIG_FILE
 
 FALSE_SHARE = 0.05
@@ -124,15 +124,31 @@ def highest_odds(learner: TimeToBrakeLearner, source: Levels, chosen: Sequence[i
     return np.array(found)
 
 
-def tested_levels(levels: Sequence[Level], families: Sequence[str]) -> dict[str, list[int]]:
-    """Return the indices of every second level of each family."""
-    seen, chosen = Counter[str](), {family: list[int]() for family in families}
-    for index, level in enumerate(levels):
-        if level.family in chosen:
-            if seen[level.family] % 2:
-                chosen[level.family].append(index)
-            seen[level.family] += 1
+def tested_levels(source: Levels, config: TrainConfig, families: Sequence[str]) -> dict[str, list[int]]:
+    """Return the indices of the training levels of each family with an odd seed.
+
+    The same level without its target has the same seed, in another set.
+    """
+    sets = [item for item in recording_sets(config, "train") if TRAFFIC not in item.name]
+    seeds = chain.from_iterable(item.seeds for item in sets)  # levels come first, one per seed
+    chosen = {family: list[int]() for family in families}
+    for index, (level, seed) in enumerate(zip(source.levels, seeds, strict=False)):
+        if level.family in chosen and seed % 2:
+            chosen[level.family].append(index)
     return chosen
+
+
+def threshold_of(odds: np.ndarray) -> float:
+    """Return the log odds that `FALSE_SHARE` of some levels exceed, from the highest of each level."""
+    return float(np.quantile(odds, 1.0 - FALSE_SHARE))
+
+
+def make_learner(config: TrainConfig, epochs: int) -> TimeToBrakeLearner:
+    """Return a learner of one network."""
+    env = config.make_policy_env("train")
+    recipe: Any = config.algo_kwargs | {"n_networks": 1, "n_epochs": epochs}
+    env.close()
+    return TimeToBrakeLearner(config.policy, env, seed=config.seed, **recipe)
 
 
 def main(arguments: Sequence[str] | None = None) -> dict[str, tuple[Rate, Rate]]:
@@ -144,43 +160,52 @@ def main(arguments: Sequence[str] | None = None) -> dict[str, tuple[Rate, Rate]]
     parser.add_argument("--jobs", type=int, default=1, help="number of threads")
     options = parser.parse_args(arguments)
     config = TrainConfig.from_dict(json.loads((options.folder / CONFIG_FILE).read_text()))
-    config = replace(config, recordings=str(options.folder))
+    config = replace(config, recordings=config.recordings or str(options.folder))
+    check_recordings(config)
     torch.set_num_threads(1)
-
-    def make_learner() -> TimeToBrakeLearner:
-        env = config.make_policy_env("train")
-        recipe: Any = config.algo_kwargs | {"n_networks": 1, "n_epochs": options.epochs}
-        env.close()
-        return TimeToBrakeLearner(config.policy, env, seed=config.seed, **recipe)
-
-    limits = make_learner().brake.limits_s
+    # before the threads, because stable-baselines3 seeds the generator that they share
+    learners = [make_learner(config, options.epochs) for _ in (None, *options.families)]
+    limits = learners[0].brake.limits_s
     source = Levels(load_or_record(config, "train", options.folder), config, limits)
     validation = Levels(load_or_record(config, "validation", options.folder), config, limits)
-    for family in options.families:
-        check_known("family of the recordings", family, sorted({item.family for item in source.levels}))
-    tested = tested_levels(source.levels, options.families)
+    tested = tested_levels(source, config, options.families)
+    threats = {
+        family: [k for k in chosen if source.levels[k].threat and source.levels[k].waits]
+        for family, chosen in tested.items()
+    }
+    known = sorted({item.family for item in source.levels if item.threat and item.family != TRAFFIC})
+    for family, chosen in threats.items():
+        check_known("family of the recordings", family, known)
+        if not chosen:
+            raise ValueError(
+                f"the recordings have no threat of {family} with an odd seed; record more levels"
+            )
     aside = {index for chosen in tested.values() for index in chosen}
     harmless = [
         index for index, item in enumerate(validation.levels) if not item.threat and item.family != TRAFFIC
     ]
 
-    def recognised(without: str | None) -> dict[str, Rate]:
+    def recognised(learner: TimeToBrakeLearner, without: str | None) -> dict[str, Rate]:
         """Train without a family, and return the share of recognised threats of each family."""
-        used = [
-            index for index, item in enumerate(source.levels) if index not in aside and item.family != without
-        ]
-        learner, train, whole = make_learner(), source.part(used), range(len(validation.levels))
-        learner.learn(train, validation.part(whole))  # type: ignore[arg-type]
-        threshold = np.quantile(highest_odds(learner, validation, harmless), 1.0 - FALSE_SHARE)
-        rates: dict[str, Rate] = {}
-        for family, chosen in tested.items():
-            threats = [k for k in chosen if source.levels[k].threat and source.levels[k].waits]
-            odds = highest_odds(learner, source, threats)
-            rates[family] = Rate.of((odds > threshold).tolist())
-        return rates
+        train, selection = (
+            levels.part(
+                [
+                    index
+                    for index, item in enumerate(levels.levels)
+                    if item.family != without and not (levels is source and index in aside)
+                ]
+            )
+            for levels in (source, validation)
+        )
+        learner.learn(train, selection)  # type: ignore[arg-type]
+        threshold = threshold_of(highest_odds(learner, validation, harmless))
+        return {
+            family: Rate.of((highest_odds(learner, source, chosen) > threshold).tolist())
+            for family, chosen in threats.items()
+        }
 
     with ThreadPoolExecutor(options.jobs) as executor:
-        complete, *others = executor.map(recognised, [None, *options.families])
+        complete, *others = executor.map(recognised, learners, [None, *options.families])
     found = {
         family: (complete[family], other[family])
         for family, other in zip(options.families, others, strict=True)

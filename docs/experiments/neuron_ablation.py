@@ -295,7 +295,7 @@ def train(train_set: FieldDataset, selection: FieldDataset, seed: int, epochs: i
     sizes = zip(train_set.names, train_set.sizes, strict=True)
     boxes: Any = {name: spaces.Box(-CLIP, CLIP, (size,), np.float32) for name, size in sizes}
     env: Any = SimpleNamespace(observation_space=spaces.Dict(boxes))
-    recipe: Any = CONFIG.algo_kwargs | {"n_networks": 1, "n_epochs": epochs}
+    recipe: Any = CONFIG.algo_kwargs | {"n_networks": 1, "n_epochs": epochs, "bfloat16": False}
     learner = TimeToBrakeLearner(CONFIG.policy, env, seed=seed, **recipe)
     learner.learn(train_set, selection)
     return learner

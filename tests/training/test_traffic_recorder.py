@@ -152,13 +152,22 @@ def test_a_contact_after_the_end_of_the_drive_is_no_threat(monkeypatch, contact,
     assert segments.count("threat") == threats
 
 
-def test_the_last_ten_seconds_before_a_contact_are_no_segment_without_threat(monkeypatch):
+@pytest.mark.parametrize(
+    ("kind", "contact", "kept"),
+    [
+        ("inattentive-highway", 30.0, 600),
+        ("inattentive-highway", 30.1, 813),  # after the end of the drive: 3 s are lost
+        ("highway", 30.0, 810),
+    ],
+)
+def test_segments_without_threat_end_ten_seconds_before_a_contact_of_drivers_who_err(
+    monkeypatch, kind, contact, kept
+):
     observations = [{"ego_speed": np.array([decision / 30.0], np.float32)} for decision in range(900)]
-    monkeypatch.setattr(traffic, "run_episode", lambda *_: (observations, Emergencies(30.0, ())))
+    monkeypatch.setattr(traffic, "run_episode", lambda *_: (observations, Emergencies(contact, ())))
     monkeypatch.setattr(traffic, "threat_episode", lambda *_: None)
-    (segments,) = TrafficRecorder("train", "fovea", ("inattentive-highway",)).record(range(1))
-    assert sum(map(len, segments)) == 600
-    assert max(float(segment.observations["ego_speed"].max()) for segment in segments) < 20.0
+    (segments,) = TrafficRecorder("train", "fovea", (kind,)).record(range(1))
+    assert sum(map(len, segments)) == kept
 
 
 def test_a_twin_that_does_not_repeat_the_contact_is_rejected():

@@ -73,9 +73,9 @@ class TimeToBrakeLearner:
         weight_decay: Weight decay of AdamW.
         dropout: Share of the hidden units that are left out in each gradient step.
         mirror: Whether each decision is mirrored, left to right, with probability 1/2 in each pass.
-        traffic_weight: Weight of a decision in traffic; one in a level has weight 1.
-        bfloat16: Whether matrix products are in bfloat16, which halves the time of training on CPUs with
-            instructions for it (AVX-512 BF16) and takes longer on others.
+        traffic_weight: Weight of a decision in traffic, in [0.01, 100]; one in a level has weight 1.
+        bfloat16: Whether matrix products are in bfloat16, which saves time on CPUs with instructions for it
+            (AVX-512 BF16) and takes longer than float32 on others.
         policy_kwargs: Further arguments of the network.
 
     Raises:
@@ -107,7 +107,7 @@ class TimeToBrakeLearner:
         self.weight_decay = check_within("weight_decay", weight_decay, 0.0, 1.0)
         self.dropout = check_within("dropout", dropout, 0.0, 0.9)
         self.mirror = check_flag("mirror", mirror)
-        self.traffic_weight = check_positive("traffic_weight", traffic_weight)
+        self.traffic_weight = check_within("traffic_weight", traffic_weight, 0.01, 100.0)
         self.bfloat16 = check_flag("bfloat16", bfloat16)
         self._seed, count = seed, check_whole("n_networks", n_networks, 1)
         given: Any = env.observation_space
@@ -229,7 +229,7 @@ class TimeToBrakeLearner:
             )
             losses = list(executor.map(update, self.networks, optimizers, generators))
             total, weight = total + float(np.mean(losses)) * weights.sum(), weight + weights.sum()
-        return total / weight
+        return float(total / weight)
 
     def _weights(self, in_traffic: np.ndarray) -> np.ndarray:
         """Return the weights of decisions, float32, (M,)."""

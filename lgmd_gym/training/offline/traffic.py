@@ -4,9 +4,9 @@ Levels last seconds and contain little driving without an event: following, onco
 episodes add it. Segments are kept in which the benchmark would call a brake needless: no emergency follows
 within `HORIZON`, see `lgmd_gym.envs.traffic.emergencies`. There, the time to brake is infinite.
 
-With inattentive drivers, the last seconds before a contact that braking avoids are kept, too. The last
-decision from which braking avoids it comes from replays of the traffic without sensors. The agent never
-brakes in these episodes.
+With inattentive drivers, the last 10 s before a contact that braking avoids are kept with their time to
+brake, and left out before any other contact. The last decision from which braking avoids it comes from
+replays of the traffic without sensors. The agent never brakes in these episodes.
 """
 
 from collections.abc import Callable
