@@ -32,12 +32,11 @@ from lgmd_gym.statistics.intervals import Rate
 from lgmd_gym.training import TrainConfig
 from lgmd_gym.training.offline.dataset import StateDataset
 from lgmd_gym.training.offline.episodes import TRAFFIC, DrivenEpisode
-from lgmd_gym.training.offline.time_to_brake import TimeToBrakeLearner
+from lgmd_gym.training.offline.time_to_brake import EVALUATED_STATES, TimeToBrakeLearner
 from lgmd_gym.training.recordings import check_recordings, load_or_record, recording_sets
 from lgmd_gym.training.trainer import CONFIG_FILE
 
 FALSE_SHARE = 0.05
-AT_ONCE = 4096  # decisions
 LATE_S = 0.3  # time to brake up to which the recorded driver must wait
 
 
@@ -112,7 +111,7 @@ def highest_odds(learner: TimeToBrakeLearner, source: Levels, chosen: Sequence[i
     indices = source.decisions(chosen)
     limit = learner.brake.limits_s.index(learner.brake.full_s)
     parts: list[Any] = [
-        Part(source.dataset, part) for part in np.array_split(indices, -(-len(indices) // AT_ONCE))
+        Part(source.dataset, part) for part in np.array_split(indices, -(-len(indices) // EVALUATED_STATES))
     ]
     odds = np.concatenate([learner.odds(part)[:, limit] for part in parts])
     counts = np.diff(source.bounds)[list(chosen)]

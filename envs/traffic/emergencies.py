@@ -26,6 +26,11 @@ HORIZON = 3.0  # [s], a brake is needed if an emergency follows within this time
 EMERGENCY_SHARE = EMERGENCY / BrakeParams().max_deceleration  # the same, as a share of full braking
 
 
+def scaled_emergency(brake: BrakeParams) -> float:
+    """Return the required deceleration of an emergency, scaled to a brake [m/s²]."""
+    return EMERGENCY_SHARE * brake.max_deceleration
+
+
 @dataclass(frozen=True, slots=True)
 class Emergencies:
     """The emergencies of an episode without braking by the agent."""

@@ -12,7 +12,7 @@ from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.attention import Attention
 from lgmd_gym.envs.dynamics.brake import EMERGENCY
 from lgmd_gym.envs.registration import make_traffic
-from lgmd_gym.envs.traffic.emergencies import EMERGENCY_SHARE, HORIZON, Emergencies
+from lgmd_gym.envs.traffic.emergencies import HORIZON, Emergencies, scaled_emergency
 from lgmd_gym.envs.traffic.env import JAM_SPEED, TrafficEnv
 from lgmd_gym.sensing.sensor_array import SensorArray
 
@@ -54,7 +54,7 @@ class TrafficRecording:
     @property
     def scaled_emergency(self) -> float:
         """Required deceleration of an emergency, scaled to the brake of the episode [m/s²]."""
-        return EMERGENCY_SHARE * self.snapshots[0].brake.max_deceleration
+        return scaled_emergency(self.snapshots[0].brake)
 
     @cached_property
     def emergencies(self) -> Emergencies:

@@ -28,11 +28,7 @@ from lgmd_gym.camera.scene import WEATHERS
 from lgmd_gym.envs.attention import INATTENTIVE
 from lgmd_gym.envs.families.distribution import draw_weather
 from lgmd_gym.envs.registration import TRAFFIC_KINDS, make_traffic
-from lgmd_gym.envs.traffic.emergencies import (
-    EMERGENCY_SHARE,
-    Emergencies,
-    simulate_driver,
-)
+from lgmd_gym.envs.traffic.emergencies import Emergencies, scaled_emergency, simulate_driver
 from lgmd_gym.envs.traffic.env import JAM_SPEED, TrafficEnv
 from lgmd_gym.neuron import NeuronSpec
 from lgmd_gym.sensing.channel import ChannelSpec
@@ -110,16 +106,14 @@ def run_episode(env: gym.Env, seed: int) -> tuple[list[Observation], Emergencies
     base: Any = env.unwrapped
     observations: list[Observation] = []
     demanding: list[float] = []
-    policy_hz, threshold = base.config["policy_frequency"], inf
+    policy_hz = base.config["policy_frequency"]
     for step, _ in rollout(env, make_agent(NO_BRAKE), seed):
-        if threshold == inf:  # the reset draws the brake
-            threshold = EMERGENCY_SHARE * base.brake.max_deceleration
         if step.done:
             break
-        if step.info["required_deceleration"] >= threshold:
+        if step.info["required_deceleration"] >= scaled_emergency(base.brake):
             demanding.append(len(observations) / policy_hz)
         observations.append(select_signals(step.observation))
-    later = simulate_driver(base, len(observations) / policy_hz, threshold=threshold)
+    later = simulate_driver(base, len(observations) / policy_hz, threshold=scaled_emergency(base.brake))
     return observations, Emergencies(later.contact, (*demanding, *later.demanding))
 
 
