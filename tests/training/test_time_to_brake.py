@@ -275,6 +275,7 @@ def test_training_writes_a_policy_with_a_brake(tmp_path):
             {"text": YAML.replace("n_epochs: 2", "traffic_weight: 0")},
             r"traffic_weight must be in \[0.01, 100\], got 0",
         ),
+        ({"text": YAML.replace("n_epochs: 2", "bfloat16: 1")}, "bfloat16 must be true or false, got 1"),
         ({"text": YAML.replace("history: 1", "history: 2")}, "requires history: 1"),
         ({"n_envs": 2}, "n_envs has no effect with algo 'time-to-brake', got 2; omit it"),
         ({"text": YAML.replace("history: 1", "history: 1, reward_scale: 0.1")}, "reward_scale has no .*0.1"),
