@@ -62,6 +62,9 @@ class Train:
     extra_levels: Annotated[tuple[str, ...] | None, arg(metavar="N:NAME[,NAME...] [...]")] = None
     """Levels of some scenario families that training on recordings uses in addition, for example
     4000:CCRsCurve,FastCCRs 1000:EmptyRoad. Default: from the hyperparameters, else none."""
+    error_levels: Annotated[tuple[str, ...] | None, arg(metavar="N:NAME[,NAME...] [...]")] = None
+    """Levels as those of --extra-levels, but with errors of the sensor that no calibration finds.
+    Default: from the hyperparameters, else none."""
     extra_traffic: Annotated[tuple[str, ...] | None, arg(metavar="N:KIND[,KIND...] [...]")] = None
     """Traffic episodes of some kinds that training on recordings uses in addition, for example
     2000:intersection,roundabout, or 400:inattentive-highway with drivers who err. Default: from the
@@ -137,6 +140,7 @@ def config_of(options: Train) -> "TrainConfig":
         recordings=None if options.recordings is None else str(options.recordings.resolve()),
         traffic_episodes=options.traffic_episodes,
         extra_levels=options.extra_levels,
+        error_levels=options.error_levels,
         extra_traffic=options.extra_traffic,
     )
     return config if options.neuron is None else config.with_neuron(options.neuron)

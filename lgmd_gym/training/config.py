@@ -35,6 +35,7 @@ RANDOM_ID = "LGMD/RandomBraking-v0"
 ALL_ROUND = "all-round"  # value of `sensors_of` for the cameras of `all_round_cameras`
 CAMERAS = ("fovea", "tele", "wide")
 SEED_STRIDE = 1_000_000  # distance between the environment seeds of neighbouring training seeds
+SET_STRIDE = 100_000  # between the first seeds of sets in traffic, or of levels with errors; limit of a set
 MAX_SEED = 2**32 - 1  # of NumPy's global generator, which stable-baselines3 seeds
 VALIDATION_SEED = 10_000  # first environment seed of an evaluation
 DEMANDS = {"ppo": (0.0, -1.0), "dqn": (0.0, -1.0), "sac": (), TIME_TO_BRAKE: ()}
@@ -163,6 +164,11 @@ class TrainConfig(Record):
         'Levels that "time-to-brake" trains on in addition, a number and scenario families each, for '
         f'example "{LEVELS_EXAMPLE}"; a twentieth as many are added to its evaluations',
     )
+    error_levels: tuple[str, ...] = value(
+        (),
+        _texts(LEVELS_EXAMPLE),
+        "As `extra_levels`, but every level has errors of the sensor that no calibration finds",
+    )
     extra_traffic: tuple[str, ...] = value(
         (),
         _texts(TRAFFIC_EXAMPLE),
@@ -181,7 +187,7 @@ class TrainConfig(Record):
         if self.algo == TIME_TO_BRAKE:
             _check_time_to_brake(self)
             return
-        for name in ("recordings", "traffic_episodes", "extra_levels", "extra_traffic"):
+        for name in ("recordings", "traffic_episodes", "extra_levels", "error_levels", "extra_traffic"):
             if getattr(self, name):
                 raise ValueError(f"{name} requires algo {TIME_TO_BRAKE!r}, got {self.algo!r}; omit it")
 
@@ -322,13 +328,17 @@ class ExtraEpisodes:
     names: tuple[str, ...]
 
 
-def parse_levels(text: str) -> ExtraEpisodes:
+def parse_levels(text: str, option: str = "extra_levels") -> ExtraEpisodes:
     """Return the levels of a text such as "400:CCRsCurve,StandingBox".
+
+    Args:
+        text: A number and scenario families.
+        option: Name of the option, for messages.
 
     Raises:
         ValueError: If the text has another form, for an unknown family, or for one that is named twice.
     """
-    return _parse_extra("extra_levels", text, LEVELS_EXAMPLE, "family", check_families)
+    return _parse_extra(option, text, LEVELS_EXAMPLE, "family", check_families)
 
 
 def parse_traffic(text: str) -> ExtraEpisodes:
@@ -352,7 +362,7 @@ def _parse_extra(
     match = re.fullmatch(r"\s*([0-9]{1,9})\s*:(.+)", text)
     if match is None:
         raise ValueError(f"{option} must be like {example!r}, got {shown(text)}")
-    count = check_whole(f"number of {option}", int(match[1]), 1)
+    count = check_whole(f"number of {option}", int(match[1]), 1, SET_STRIDE)
     names = check([name.strip() for name in match[2].split(",")])
     if len(set(names)) < len(names):
         raise ValueError(f"{option} names a {noun} twice: {shown(text)}; use each name once")
@@ -370,8 +380,11 @@ def _check_extra_episodes(config: "TrainConfig") -> None:
             f"extra_levels names {repeated!r} in two sets, which would contain the same levels; "
             "increase the number of one set"
         )
-    if families and config.env_id != RANDOM_ID:
-        raise ValueError(f"extra_levels requires env {RANDOM_ID!r}, got {config.env_id!r}; omit it")
+    for item in config.error_levels:
+        parse_levels(item, "error_levels")
+    for name in ("extra_levels", "error_levels"):
+        if getattr(config, name) and config.env_id != RANDOM_ID:
+            raise ValueError(f"{name} requires env {RANDOM_ID!r}, got {config.env_id!r}; omit it")
 
 
 def _check_time_to_brake(config: "TrainConfig") -> None:

@@ -20,7 +20,10 @@ from lgmd_gym.processes.inputs import read_text
 TIME_TO_BRAKE = "time-to-brake"  # the algorithm of `lgmd_gym.training.offline.time_to_brake`
 ALGORITHMS = ("ppo", "sac", "dqn", TIME_TO_BRAKE)
 WRAPPER = "lgmd_gym.training.PolicyWrapper"
-OPTIONS = ("policy", "env_kwargs", "eval_episodes", "traffic_episodes", "extra_levels", "extra_traffic")
+OPTIONS = (
+    *("policy", "env_kwargs", "eval_episodes"),
+    *("traffic_episodes", "extra_levels", "error_levels", "extra_traffic"),
+)
 """Further options of `TrainConfig` that a file may contain."""
 
 

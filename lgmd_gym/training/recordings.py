@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from itertools import chain
 from json import dumps, loads
 from pathlib import Path
+from typing import NamedTuple
 
 import gymnasium as gym
 
@@ -17,6 +18,7 @@ from lgmd_gym.errors import counted
 from lgmd_gym.sensing.channel import make_channels
 from lgmd_gym.training.config import (
     SEED_STRIDE,
+    SET_STRIDE,
     VALIDATION_SEED,
     ExtraEpisodes,
     TrainConfig,
@@ -39,17 +41,33 @@ from lgmd_gym.training.offline.traffic import TrafficRecorder
 LEVEL_CHUNK_SIZE = 25  # levels recorded by one task of a process, for the environments of the engine
 FILE_SIZE = 100  # largest number of seeds in one file
 TRAFFIC_RATIO = 4  # training episodes in traffic per validation episode in traffic
-EXTRA_TRAFFIC_STRIDE = 100_000  # distance between the first seeds of neighbouring sets in traffic
 EXTRA_RATIO = 20  # extra levels for training per extra level for validation
 REUSED = "omit --recordings, or record in a new training folder"  # for recordings with other settings
 FORMAT = 6  # of the files; recordings of another format are rejected
+
+
+class LevelKind(NamedTuple):
+    """A kind of additional levels."""
+
+    option: str  # attribute of `TrainConfig`
+    prefix: str  # of the names of its sets
+    stride: int  # distance between the first seeds of its sets; 0 for the same first seed
+    arguments: Values  # arguments of the environment
+
+
+# Sets of `extra_levels` have the same seeds, so that one can be the levels of another without their target.
+LEVEL_KINDS = (
+    LevelKind("extra_levels", "extra", 0, {}),
+    LevelKind("error_levels", "errors", SET_STRIDE, {"sensor_errors": 1.0}),
+)
 
 
 @dataclass(frozen=True)
 class RecordingSet:
     """Recorded episodes of one kind."""
 
-    # name of the folder: "train" or "validation", after "extra1-", "traffic-" or "extra-traffic1-" for more
+    # name of the folder: "train" or "validation", for more after "extra1-", "errors1-", "traffic-" or
+    # "extra-traffic1-"
     name: str
     seeds: range  # seeds of the environment
     record: RecordFunction  # returns the episodes of each seed
@@ -67,17 +85,18 @@ def _level_sets(config: TrainConfig, split: str) -> list[RecordingSet]:
     train = split == "train"
     first = config.first_seed if train else VALIDATION_SEED
     count = config.n_timesteps if train else config.eval_episodes
-    levels = _level_recorder(config, split)
-    sets = [RecordingSet(split, range(first, first + count), levels.record)]
-    for number, text in enumerate(config.extra_levels, 1):
-        extra = parse_levels(text)
-        families = list(extra.names)
-        changed = replace(config, env_kwargs=config.env_kwargs | {"families": families})
-        count = extra.count if train else -(-extra.count // EXTRA_RATIO)
-        option = f" --extra-levels {' '.join(config.extra_levels)}"
-        record = _level_recorder(changed, split).record
-        seeds = range(first, first + count)
-        sets.append(RecordingSet(f"extra{number}-{split}", seeds, record, option, {"families": families}))
+    sets = [RecordingSet(split, range(first, first + count), _level_recorder(config, split).record)]
+    for kind in LEVEL_KINDS:
+        texts: tuple[str, ...] = getattr(config, kind.option)
+        option = f" --{kind.option.replace('_', '-')} {' '.join(texts)}"
+        for number, text in enumerate(texts, 1):
+            extra = parse_levels(text, kind.option)
+            settings: Values = {"families": list(extra.names), **kind.arguments}
+            changed = replace(config, env_kwargs=config.env_kwargs | settings)
+            start = first + kind.stride * number
+            seeds = range(start, start + (extra.count if train else -(-extra.count // EXTRA_RATIO)))
+            record = _level_recorder(changed, split).record
+            sets.append(RecordingSet(f"{kind.prefix}{number}-{split}", seeds, record, option, settings))
     return sets
 
 
@@ -100,7 +119,7 @@ def _traffic_set(
     train = split == "train"
     # The traffic suite of the benchmark uses the seeds from 0 on.
     first = SEED_STRIDE * (config.seed + 1) if train else VALIDATION_SEED
-    first += EXTRA_TRAFFIC_STRIDE * number
+    first += SET_STRIDE * number
     seeds = range(first, first + (traffic.count if train else -(-traffic.count // TRAFFIC_RATIO)))
     params = config.env_kwargs.get("params")
     record = TrafficRecorder(split, config.camera, traffic.names, params).record

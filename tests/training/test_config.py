@@ -79,12 +79,14 @@ default:
   eval_episodes: 7
   traffic_episodes: 8
   extra_levels: ["40:CPNA,CPFA", "20:StandingBox"]
+  error_levels: ["10:CPNA"]
   extra_traffic: ["30:inattentive-highway"]
 """
     file = write_yaml(tmp_path, text)
     config = TrainConfig.from_hyperparams("time-to-brake", file=file)
     assert (config.eval_episodes, config.traffic_episodes) == (7, 8)
     assert config.extra_levels == ("40:CPNA,CPFA", "20:StandingBox")
+    assert config.error_levels == ("10:CPNA",)
     assert config.extra_traffic == ("30:inattentive-highway",)
     given = TrainConfig.from_hyperparams("time-to-brake", file=file, traffic_episodes=0, extra_levels=())
     assert (given.traffic_episodes, given.extra_levels) == (0, ())
@@ -112,7 +114,7 @@ def test_cameras_are_presets_or_those_of_an_agent():
         TrainConfig.from_hyperparams("sac", sensors_of="spike-threshold")
     with pytest.raises(ValueError, match="unknown agent 'allround'; did you mean 'all-round'"):
         TrainConfig.from_hyperparams("sac", sensors_of="allround")
-    assert len(TrainConfig.from_hyperparams("sac", sensors_of="all-round").camera) == 31
+    assert len(TrainConfig.from_hyperparams("sac", sensors_of="all-round").camera) == 22
 
 
 @pytest.mark.parametrize(
@@ -146,7 +148,7 @@ def test_cameras_are_presets_or_those_of_an_agent():
         (
             "time-to-brake",
             {"extra_levels": ["0:CCRs"]},
-            "of extra_levels must be a whole number >= 1, got 0",
+            r"of extra_levels must be a whole number in \[1, 100000\], got 0",
         ),
         ("time-to-brake", {"extra_levels": ["3:CCRs,"]}, "unknown family of random levels ''"),
         ("time-to-brake", {"extra_levels": ["3:"]}, "extra_levels must be like .*, got '3:'"),
@@ -183,7 +185,7 @@ def test_cameras_are_presets_or_those_of_an_agent():
         (
             "time-to-brake",
             {"extra_traffic": ["0:highway"]},
-            "extra_traffic must be a whole number >= 1, got 0",
+            "extra_traffic must be a whole number in .*, got 0",
         ),
         (
             "time-to-brake",
@@ -215,6 +217,14 @@ def test_cameras_are_presets_or_those_of_an_agent():
             "time-to-brake",
             {"extra_levels": ["5:CCRsCurve", "3:StandingBox,CCRsCurve"]},
             "extra_levels names 'CCRsCurve' in two sets, which would contain the same levels",
+        ),
+        ("dqn", {"error_levels": ["3:CCRs"]}, "error_levels requires algo .*, got 'dqn'"),
+        ("time-to-brake", {"error_levels": ["100001:CCRs"]}, "number of error_levels must be .*, got 100001"),
+        ("time-to-brake", {"error_levels": ["CCRs"]}, "error_levels must be like .*, got 'CCRs'"),
+        (
+            "time-to-brake",
+            {"env_id": "LGMD/CCRs-v0", "error_levels": ["3:CCRs"]},
+            "error_levels requires env 'LGMD/RandomBraking-v0', got 'LGMD/CCRs-v0'",
         ),
         (
             "ppo",
@@ -322,6 +332,7 @@ def test_invalid_algorithm_arguments_are_rejected(tmp_path, algo, algo_kwargs, m
         (["--n-timesteps", "0"], "n_timesteps must be in [1, inf), got 0"),
         (["--jobs", "0"], "jobs must be a whole number >= 1, got 0"),
         (["--extra-levels", "3:CCRs"], "extra_levels requires algo 'time-to-brake', got 'dqn'"),
+        (["--error-levels", "3:CCRs"], "error_levels requires algo 'time-to-brake', got 'dqn'"),
         (
             ["--extra-traffic", "3:merge"],
             "extra_traffic requires algo 'time-to-brake', got 'dqn'",

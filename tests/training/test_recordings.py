@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import gymnasium as gym
 import numpy as np
 import pytest
 from support.recordings import recorded_config, synthetic_episode
@@ -180,6 +181,34 @@ def test_extra_levels_are_of_the_chosen_families(tmp_path):
     ((episode,),) = sets[1].record(range(1))
     assert (episode.family, episode.threat) == ("CurvePass", False)
     assert {episode.family for (episode,) in sets[2].record(range(6))} == {"CCRs", "EmptyRoad"}
+
+
+def test_every_error_level_has_errors_of_the_sensor(tmp_path):
+    options = {"extra_levels": ["5:CCRs"], "error_levels": ["41:CCRs", "20:EmptyRoad"]}
+    config = recorded_config(
+        tmp_path, **options, eval_episodes=2, n_timesteps=3, env_kwargs={"sensor_errors": 0.1}
+    )
+    shares = {}
+    for split in ("train", "validation"):
+        sets = {item.name: item for item in recording_sets(config, split)}
+        assert list(sets) == [split, *(f"{name}-{split}" for name in ("extra1", "errors1", "errors2"))]
+        seeds = [
+            seed for name in (split, f"errors1-{split}", f"errors2-{split}") for seed in sets[name].seeds
+        ]
+        assert len(set(seeds)) == len(seeds)  # other levels, also in two sets of one family
+        shares |= {name: item.record.__self__.arguments["sensor_errors"] for name, item in sets.items()}
+    assert {name for name, share in shares.items() if share == 1.0} == {
+        f"errors{number}-{split}" for number in (1, 2) for split in ("train", "validation")
+    }
+    assert {share for share in shares.values() if share != 1.0} == {0.1}
+    item = next(item for item in recording_sets(config, "train") if item.name == "errors1-train")
+    assert item.settings == {"families": ["CCRs"], "sensor_errors": 1.0}
+    assert item.option == " --error-levels 41:CCRs 20:EmptyRoad"
+    assert len(item.seeds) == 41
+    envs = gym.make_vec(item.record.__self__.env_id, num_envs=3, **item.record.__self__.arguments)
+    envs.reset(seed=list(item.seeds[:3]))
+    assert all(scene.pitch_error_deg != 0.0 for scene in envs.unwrapped.get_attr("scene"))
+    envs.close()
 
 
 def test_reused_extra_levels_are_of_the_same_families(tmp_path):
