@@ -28,6 +28,16 @@ def test_batches_equal_the_observations_of_the_policy_wrapper(tmp_path):
     assert row == len(dataset)
 
 
+def test_decisions_of_many_episodes_are_in_their_order():
+    features = FeatureConfig(inputs=("ego_speed", "ego_yaw_rate"), history=1, repeat=2)
+    episodes = [synthetic_episode(1 + 7 * (number % 9), seed=number) for number in range(50)]
+    data = StateDataset(iter(episodes), features, (0.1,))
+    single = [StateDataset([episode], features, (0.1,)) for episode in episodes]
+    for name in ("features", "classes", "braking", "in_traffic"):
+        assert np.array_equal(getattr(data, name), np.concatenate([getattr(item, name) for item in single]))
+    assert data.features.shape == (sum(map(len, single)), 2)
+
+
 def test_a_lower_decision_rate_uses_every_third_decision():
     episode = synthetic_episode(11)
     features = FeatureConfig(inputs=("ego_speed",), history=1, repeat=3)

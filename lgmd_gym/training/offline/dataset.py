@@ -64,7 +64,7 @@ class StateDataset:
         self, episodes: Iterable[DrivenEpisode], features: FeatureConfig, limits_s: Sequence[float]
     ) -> None:
         self.names = sorted(features.inputs)
-        tables: list[np.ndarray] = []
+        rows = _Rows()
         times, demands, in_traffic = list[np.ndarray](), list[np.ndarray](), list[np.ndarray]()
         self.sizes: list[int] = []
         remaining = iter(episodes)
@@ -72,14 +72,14 @@ class StateDataset:
             for inputs in policy_inputs([episode.observations for episode in group], features):
                 self.sizes = [inputs[name].shape[1] for name in self.names]
                 parts = [inputs[name].astype(np.float16) for name in self.names]
-                tables.append(np.concatenate(parts, axis=1))
+                rows.append(np.concatenate(parts, axis=1))
             times += [episode.time_to_brake[:: features.repeat] for episode in group]
             before = [np.concatenate([[HOLD], episode.demands[:-1]]) for episode in group]
             demands += [values[:: features.repeat] for values in before]
             in_traffic += [
                 np.full(-(-len(episode) // features.repeat), episode.family == TRAFFIC) for episode in group
             ]
-        self.features = _joined(tables)
+        self.features = rows.array()
         self.classes = np.digitize(np.concatenate(times), limits_s)
         self.braking = np.concatenate(demands) < HOLD
         self.in_traffic = np.concatenate(in_traffic)
@@ -108,15 +108,27 @@ class StateDataset:
         return mirror_input(name, values)
 
 
-def _joined(tables: list[np.ndarray]) -> np.ndarray:
-    """Return tables one below the other. The list is emptied, so that few features are in memory twice."""
-    joined = np.empty((sum(map(len, tables)), tables[0].shape[1]), tables[0].dtype)
-    end = len(joined)
-    while tables:
-        part = tables.pop()
-        joined[end - len(part) : end] = part
-        end -= len(part)
-    return joined
+class _Rows:
+    """Rows of an array that grows in place, so that few features are in memory twice."""
+
+    def __init__(self) -> None:
+        self._values, self._count = np.empty((0, 0)), 0
+
+    def append(self, rows: np.ndarray) -> None:
+        """Append rows, (N, columns)."""
+        if not self._count:
+            self._values = np.empty((0, rows.shape[1]), rows.dtype)
+        end = self._count + len(rows)
+        if end > len(self._values):
+            # The operating system moves large arrays without a copy.
+            self._values.resize((max(end, len(self._values) * 9 // 8), rows.shape[1]), refcheck=False)
+        self._values[self._count : end] = rows
+        self._count = end
+
+    def array(self) -> np.ndarray:
+        """Return all rows; none can be appended any more."""
+        self._values.resize((self._count, self._values.shape[1]), refcheck=False)
+        return self._values
 
 
 def policy_inputs(episodes: Sequence[Observation], features: FeatureConfig) -> list[dict[str, np.ndarray]]:
