@@ -5,7 +5,6 @@ from typing import NamedTuple
 from lgmd_gym.agents.zones import (
     CONTRAST_S,
     DRY_DECELERATION,
-    LOW_ZONES,
     REACHES,
     REACTION,
     SPAN_M,
@@ -13,11 +12,12 @@ from lgmd_gym.agents.zones import (
 )
 from lgmd_gym.aliases import Values
 
-# The forward fields are those of `stopping-zone` at twice the width: a pedestrian on collision course is
-# beside the ego's lane until the last second. One more zone, beyond them, is that of warnings.
+# The forward fields are those of `stopping-zone` at twice the width, because a pedestrian on collision course
+# is beside the ego's lane until the last second; every other zone of them, and one beyond them for warnings.
 FORWARD_WIDTH_PX, FORWARD_SPAN_M, FORWARD_COLUMNS = 160, 2.0 * SPAN_M, 10
-FORWARD_REACHES = (*REACHES, 2.5)
-NUM_FORWARD_FIELDS = 2 * len(FORWARD_REACHES) + len(LOW_ZONES)
+FORWARD_KINDS = ("ground", "upright")
+FORWARD_REACHES = (*REACHES[::2], 2.5)
+NUM_FORWARD_FIELDS = len(FORWARD_KINDS) * len(FORWARD_REACHES)
 FORWARD_NEURON = "dsn"
 NEURONS = ("dsn", "edges")  # at the sides
 SIDE_WIDTH_PX, SIDE_COLUMNS = 80, 5
@@ -48,16 +48,15 @@ NUM_COLUMNS = NUM_FORWARD_COLUMNS + NUM_SIDE_FIELDS * len(NEURONS) * SIDE_COLUMN
 
 
 def forward_cameras() -> list[Values]:
-    """Return the channels of the path: eight ground fields, eight upright fields, three low fields.
+    """Return the channels of the path: five ground fields and five upright fields, nearest first.
 
-    They are those of `stopping-zone` with one more zone, at twice the width, with ten columns of 0.48 m at
-    the far end. Their stopping distance follows the car's estimate of its full braking.
+    They have ten columns of 0.48 m at the far end. Their stopping distance follows the car's estimate of its
+    full braking.
     """
-    zones = {"ground": FORWARD_REACHES, "upright": FORWARD_REACHES, "low": [REACHES[k] for k in LOW_ZONES]}
     cameras = [
         zone_camera(kind, reach, DRY_DECELERATION, REACTION)
-        for kind, reaches in zones.items()
-        for reach in reaches
+        for kind in FORWARD_KINDS
+        for reach in FORWARD_REACHES
     ]
     return [
         {
