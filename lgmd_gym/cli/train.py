@@ -60,8 +60,8 @@ class Train:
     """Number of traffic episodes that training on recordings uses in addition.
     Default: from the hyperparameters, else 0."""
     extra_levels: Annotated[tuple[str, ...] | None, arg(metavar="N:NAME[,NAME...] [...]")] = None
-    """Levels of some scenario families that training on recordings uses in addition, for example
-    4000:CCRsCurve,FastCCRs 1000:EmptyRoad. Default: from the hyperparameters, else none."""
+    """Levels of some scenario families that training on recordings uses in addition, for example 40:CPNA,CPFA
+    1000:EmptyRoad. Default: from the hyperparameters, else none."""
     error_levels: Annotated[tuple[str, ...] | None, arg(metavar="N:NAME[,NAME...] [...]")] = None
     """Levels as those of --extra-levels, but with errors of the sensor that no calibration finds.
     Default: from the hyperparameters, else none."""
