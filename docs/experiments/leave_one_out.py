@@ -11,7 +11,7 @@ that are not of this family; nor does it select the epoch. The table has the sha
 are recognised in time: the log odds of full braking exceed a threshold while full braking still avoids the
 contact, and before the recorded driver brakes. Threats in which the driver brakes earlier than 0.3 s before
 the last moment are left out. The threshold of each network is the one that 5 % of the validation levels
-without a threat exceed.
+without a threat exceed. Levels of `error_levels` count as the others.
 """
 
 import argparse
