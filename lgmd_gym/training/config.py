@@ -35,7 +35,8 @@ RANDOM_ID = "LGMD/RandomBraking-v0"
 ALL_ROUND = "all-round"  # value of `sensors_of` for the cameras of `all_round_cameras`
 CAMERAS = ("fovea", "tele", "wide")
 SEED_STRIDE = 1_000_000  # distance between the environment seeds of neighbouring training seeds
-SET_STRIDE = 100_000  # between the first seeds of sets in traffic, or of levels with errors; limit of a set
+# distance between the first seeds of neighbouring sets of traffic, or of error levels; most seeds of a set
+SET_STRIDE = 100_000
 MAX_SEED = 2**32 - 1  # of NumPy's global generator, which stable-baselines3 seeds
 VALIDATION_SEED = 10_000  # first environment seed of an evaluation
 DEMANDS = {"ppo": (0.0, -1.0), "dqn": (0.0, -1.0), "sac": (), TIME_TO_BRAKE: ()}

@@ -192,9 +192,8 @@ def test_every_error_level_has_errors_of_the_sensor(tmp_path):
     for split in ("train", "validation"):
         sets = {item.name: item for item in recording_sets(config, split)}
         assert list(sets) == [split, *(f"{name}-{split}" for name in ("extra1", "errors1", "errors2"))]
-        seeds = [
-            seed for name in (split, f"errors1-{split}", f"errors2-{split}") for seed in sets[name].seeds
-        ]
+        others = (split, f"errors1-{split}", f"errors2-{split}")
+        seeds = [seed for name in others for seed in sets[name].seeds]
         assert len(set(seeds)) == len(seeds)  # other levels, also in two sets of one family
         shares |= {name: item.record.__self__.arguments["sensor_errors"] for name, item in sets.items()}
     assert {name for name, share in shares.items() if share == 1.0} == {

@@ -120,7 +120,7 @@ class _Rows:
             self._values = np.empty((0, rows.shape[1]), rows.dtype)
         end = self._count + len(rows)
         if end > len(self._values):
-            # The operating system moves large arrays without a copy.
+            # Linux moves large arrays without a copy.
             self._values.resize((max(end, len(self._values) * 9 // 8), rows.shape[1]), refcheck=False)
         self._values[self._count : end] = rows
         self._count = end
