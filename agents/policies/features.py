@@ -190,8 +190,9 @@ class FeatureHistory:
     Call `update` at every decision of the environment and `stack` at every decision of the policy.
 
     For each field of a camera, `zones` and similar inputs have four features, see `levels_of`: the weaker
-    level of the last two frames, then the averages of the level with time constants of 0.1, 0.4 and 1.2 s,
-    which begin at 0.
+    level of the last two frames, then averages of the level with time constants of 0.1, 0.4 and 1.2 s. An
+    average is the mean of all frames until their number reaches its time constant: averages that begin at 0
+    would tell a network the time since the start, which predicts the threat of a scenario but of no drive.
 
     Args:
         features: Configuration of the policy.
@@ -292,9 +293,12 @@ class FeatureHistory:
         last = _where(first, level, self._read(f"level/{name}", chosen, level))
         zeros = np.zeros((len(level), NUM_LEVELS - 1, level.shape[1])) if first is not None else level
         mean = _where(first, zeros, self._read(f"mean/{name}", chosen, zeros))
+        none = np.zeros((len(level), 1, 1))
+        frames = _where(first, none, self._read(f"frames/{name}", chosen, none)) + 1.0
+        self._write(f"frames/{name}", chosen, frames)
         self._write(f"last/{name}", chosen, last)
         self._write(f"level/{name}", chosen, level)
-        self._write(f"mean/{name}", chosen, mean + GAINS * (level[:, None] - mean))
+        self._write(f"mean/{name}", chosen, mean + np.maximum(GAINS, 1.0 / frames) * (level[:, None] - mean))
 
     def _chosen(self, rows: np.ndarray | None) -> Chosen:
         """Return the rows of arrays of the state; a slice, which makes no copies, for all of them."""

@@ -254,7 +254,7 @@ def features_of(levels: np.ndarray) -> np.ndarray:
     means = np.empty((len(values), len(GAINS), values.shape[1]), np.float32)
     mean = np.zeros(means.shape[1:], np.float32)
     for time, level in enumerate(values):
-        mean = mean + GAINS.astype(np.float32) * (level - mean)
+        mean = mean + np.maximum(GAINS, 1.0 / (1 + time)).astype(np.float32) * (level - mean)
         means[time] = mean
     last = np.concatenate([values[:1], values[:-1]])
     parts = [weaker(values, last), means.reshape(len(values), -1)]

@@ -109,13 +109,24 @@ def test_zone_features_take_the_smaller_level_of_two_frames():
 
 
 def test_averages_approach_the_level_with_their_time_constants():
-    """The gain of each frame is dt / (dt + τ)."""
+    """The gain of each frame is dt / (dt + τ), once that many frames have passed."""
     history, levels, zone = zone_history(), zone_levels(upright=4.0), NUM_ZONES + REACHES.index(1.0)
+    zone_features(history, *[np.zeros(NUM_FIELDS)] * 200)
     averages = zone_features(history, *[levels] * 12)[1:, zone] / (np.log1p(8.0) / 3.4)
     expected = [1.0 - (1.0 - 1.0 / (1.0 + 30.0 * tau)) ** 12 for tau in TIME_CONSTANTS_S]
     assert averages == pytest.approx(expected, abs=1e-6)
     history.reset()
     assert np.all(zone_features(history, np.zeros(NUM_FIELDS)) == 0.0)
+
+
+def test_averages_do_not_depend_on_the_time_since_the_start():
+    history, levels, zone = zone_history(), zone_levels(upright=4.0), NUM_ZONES + REACHES.index(1.0)
+    for _ in range(30):
+        assert zone_features(history, levels)[1:, zone] == pytest.approx(np.log1p(8.0) / 3.4, abs=1e-6)
+    # 1 s at one level, then two frames without: the mean of all frames for the longest average
+    averages = zone_features(history, *[np.zeros(NUM_FIELDS)] * 2)[1:, zone] / (np.log1p(8.0) / 3.4)
+    assert averages[2] == pytest.approx(30 / 32, abs=1e-6)
+    assert averages[0] == pytest.approx((1.0 - 1.0 / 4.0) ** 2, abs=1e-6)
 
 
 def test_features_of_columns_have_the_sign_of_the_motion():
@@ -124,7 +135,7 @@ def test_features_of_columns_have_the_sign_of_the_motion():
     features = stack(zone_history("columns"), observation)["columns"].reshape(4, NUM_COLUMNS)
     expected = np.sign(responses) * np.log1p(2.0 * np.abs(responses)) / 3.4
     assert features[0] == pytest.approx(expected, abs=1e-5)
-    assert features[1] == pytest.approx(features[0] / (1.0 + 30.0 * TIME_CONSTANTS_S[0]), abs=1e-6)
+    assert features[1] == pytest.approx(features[0], abs=1e-6)  # the first frame
 
 
 def test_features_of_mean_strengths_at_the_sides():
