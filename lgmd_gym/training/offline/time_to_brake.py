@@ -3,7 +3,7 @@
 """`TimeToBrakeLearner`: a policy that estimates the time to brake at the decisions of driven episodes."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -215,21 +215,27 @@ class TimeToBrakeLearner:
         executor: Executor,
     ) -> float:
         """Train on each decision once, and return the mean loss."""
-        total = weight = 0.0
+        losses, weights = list[float](), list[float]()
+        running = list[Future[float]]()
         for indices in np.array_split(rng.permutation(len(train)), -(-len(train) // self.batch_size)):
+            # This thread prepares a batch while others take the step before.
             mirrored = rng.random(len(indices)) < 0.5 if self.mirror else None
             features = standardisation.apply(train.batch(indices, mirrored))
-            weights = self._weights(train.in_traffic[indices])
+            given = self._weights(train.in_traffic[indices])
             update = partial(
                 _update,
                 features=features.bfloat16() if self.bfloat16 else features,
                 classes=torch.from_numpy(train.classes[indices]),
-                weights=torch.from_numpy(weights),
+                weights=torch.from_numpy(given),
                 dropout=self.dropout,
             )
-            losses = list(executor.map(update, self.networks, optimizers, generators))
-            total, weight = total + float(np.mean(losses)) * weights.sum(), weight + weights.sum()
-        return float(total / weight)
+            losses += _mean_loss(running)
+            running = [
+                executor.submit(update, *parts)
+                for parts in zip(self.networks, optimizers, generators, strict=True)
+            ]
+            weights.append(float(given.sum()))
+        return float(np.average(losses + _mean_loss(running), weights=weights))
 
     def _weights(self, in_traffic: np.ndarray) -> np.ndarray:
         """Return the weights of decisions, float32, (M,)."""
@@ -256,6 +262,11 @@ def _update(
     loss = (cross_entropy(logits, classes, reduction="none") * weights).sum() / weights.sum()
     optimizer.step(loss)
     return float(loss.detach())
+
+
+def _mean_loss(running: "Sequence[Future[float]]") -> list[float]:
+    """Wait for the steps of all networks, and return their mean loss; nothing for no steps."""
+    return [float(np.mean([future.result() for future in running]))] if running else []
 
 
 def leave_out(units: torch.Tensor, share: float, generator: torch.Generator) -> torch.Tensor:
