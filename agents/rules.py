@@ -27,7 +27,7 @@ from lgmd_gym.processes.inputs import read_toml
 
 POSITIVE, COUNT = "(0, inf)", "[1, inf)"
 CAMERA = "camera"  # group of the parameters that determine the cameras of a rule
-_MARGIN = 3e-7  # of K to 0 and 1, so that excitations are at most 15
+POTENTIAL_MARGIN = 3e-7  # of K to 0 and 1, so that excitations are at most 15
 
 
 def excitation(membrane_potential: ArrayLike) -> np.ndarray:
@@ -37,7 +37,7 @@ def excitation(membrane_potential: ArrayLike) -> np.ndarray:
     direction-selective neuron are negative for motion to the left.
     """
     k = np.asarray(membrane_potential, dtype=np.float64)
-    k = np.minimum(np.maximum(k, _MARGIN), 1.0 - _MARGIN)  # faster than np.clip
+    k = np.minimum(np.maximum(k, POTENTIAL_MARGIN), 1.0 - POTENTIAL_MARGIN)  # faster than np.clip
     return np.log(k / (1.0 - k))
 
 

@@ -1,5 +1,6 @@
 """Evidence of a policy that estimates the time to brake: how long full braking can still wait."""
 
+from functools import lru_cache
 from math import inf
 
 import numpy as np
@@ -10,8 +11,9 @@ from lgmd_gym.fields import number, record, value
 
 MAX_ODDS = 50.0  # means never
 ODDS = f"[-{MAX_ODDS:g}, {MAX_ODDS:g}]"
-# The outputs of a network depend on the size of the batch, because the order of float32 sums does. The
-# differences are near 1e-6. A distance from every threshold beyond this limit does not depend on them.
+# The outputs of a network that torch runs depend on the size of the batch, because the order of float32 sums
+# does. The differences are near 1e-6. A distance from every threshold beyond this limit does not depend on
+# them.
 SAFE_DISTANCE = 1e-3
 
 
@@ -76,13 +78,19 @@ class TimeToBrakeParams(StageParams):
             odds: Log odds, see `odds`.
             margin: Added to the thresholds of all stages but those of 50, which are never reached.
         """
-        evidence = np.full(len(odds), int(Evidence.CLEAR))
-        safe = np.ones(len(odds), np.bool_)
-        for item in (Evidence.PRESENT, Evidence.WARNING, Evidence.PARTIAL, Evidence.FULL):
-            name = item.name.lower()
-            limit = self.limits_s.index(getattr(self, f"{name}_s"))
-            threshold: float = getattr(self, f"{name}_odds")
-            distance = odds[:, limit] - (inf if threshold == MAX_ODDS else threshold) - margin
-            evidence = np.where(distance > 0.0, int(item), evidence)
-            safe &= np.abs(distance) > SAFE_DISTANCE
-        return evidence, safe
+        limits, thresholds = _thresholds(self)
+        distance = odds[:, limits] - (thresholds + margin)
+        evidence = np.maximum.reduce((distance > 0.0) * _STAGES, axis=1)  # CLEAR is 0
+        return evidence, np.logical_and.reduce(np.abs(distance) > SAFE_DISTANCE, axis=1)
+
+
+_STAGES = np.array([Evidence.PRESENT, Evidence.WARNING, Evidence.PARTIAL, Evidence.FULL], np.int64)
+
+
+@lru_cache(maxsize=64)  # a search for thresholds makes thousands of records
+def _thresholds(params: TimeToBrakeParams) -> tuple[np.ndarray, np.ndarray]:
+    """Return the index of the limit of each stage, int64, and its log odds, float64, infinite for never."""
+    names = [Evidence(stage).name.lower() for stage in _STAGES]
+    odds: list[float] = [getattr(params, f"{name}_odds") for name in names]
+    limits = [params.limits_s.index(getattr(params, f"{name}_s")) for name in names]
+    return np.array(limits), np.array([inf if item == MAX_ODDS else item for item in odds])

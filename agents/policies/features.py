@@ -12,7 +12,6 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from lgmd_gym.agents.base import FPS, Observations
-from lgmd_gym.agents.rules import excitation
 from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS, NUM_FORWARD_FIELDS, NUM_SIDE_FIELDS
 from lgmd_gym.agents.zones import NUM_FIELDS
 from lgmd_gym.aliases import Values
@@ -189,10 +188,12 @@ class FeatureHistory:
 
     Call `update` at every decision of the environment and `stack` at every decision of the policy.
 
-    For each field of a camera, `zones` and similar inputs have four features, see `levels_of`: the weaker
-    level of the last two frames, then averages of the level with time constants of 0.1, 0.4 and 1.2 s. An
-    average is the mean of all frames until their number reaches its time constant: averages that begin at 0
-    would tell a network the time since the start, which predicts the threat of a scenario but of no drive.
+    For each field of a camera, `zones` and similar inputs have four features: the weaker level of the last
+    two frames, then the averages of the level with time constants of 0.1, 0.4 and 1.2 s, which begin at 0.
+
+    The level of a field is its signal on a logarithmic scale. Membrane potentials K are converted to
+    excitations log(K / (1 - K)). That of a direction-selective neuron is negative for motion to the left, and
+    so is its level.
 
     Args:
         features: Configuration of the policy.
@@ -204,10 +205,12 @@ class FeatureHistory:
         self, features: FeatureConfig, num_envs: int = 1, zone_type: type[np.floating] = np.float32
     ) -> None:
         self.features, self._zone_type = features, zone_type
-        self._zones = [name for name in features.inputs if name in ZONE_INPUTS]
         self._required = {source_observation(name) for name in features.inputs}
-        self._kept = {source_observation(name) for name in features.inputs if name not in ZONE_INPUTS}
-        self._state: dict[str, np.ndarray] = {}  # arrays of shape (N, …), made at the first observation
+        self._scaled = [name for name in features.inputs if name in SCALES or name in DERIVED_INPUTS]
+        self._parts: dict[str, slice] = {}  # values of the scaled inputs, known at the first observation
+        self._fields = _Fields([name for name in features.inputs if name in ZONE_INPUTS], num_envs)
+        self._allocated = False
+        self._all = np.arange(num_envs)
         self._updated = np.zeros(num_envs, np.bool_)  # environments with an observation
         self._stacked = np.zeros(num_envs, np.bool_)  # environments with a history
 
@@ -230,17 +233,19 @@ class FeatureHistory:
         for name in self._required:
             if name not in observations:
                 raise ValueError(f"the policy requires the observation {name!r}, got {sorted(observations)}")
-        for name in self._kept:
-            self._write(f"observation/{name}", chosen, np.asarray(observations[name])[chosen])
-        first = ~self._updated[chosen]
-        first = first if first.any() else None
-        if "spike_peak" in self.features.inputs:
-            frequency = np.asarray(observations["spike_frequency"])[chosen]
-            decayed = PEAK_DECAY * self._read("peak", chosen, frequency)
-            self._write("peak", chosen, _where(first, frequency, np.maximum(frequency, decayed)))
-        for name in self._zones:
-            level = levels_of(name, np.asarray(observations[ZONE_INPUTS[name].source])[chosen])
-            self._update_zone(name, chosen, level, first)
+        if not self._allocated:
+            self._allocate(observations)
+        for name, part in self._parts.items():
+            value = np.asarray(observations[source_observation(name)])[chosen]
+            if name == "spike_peak":
+                decayed = PEAK_DECAY * self._values[chosen, part]
+                value = np.where(self._updated[chosen, None], np.maximum(value, decayed), value)
+            self._values[chosen, part] = value
+        if FRAME in self.features.inputs:
+            self._frames[chosen] = np.asarray(observations[FRAME])[chosen]
+        if self._fields.parts:
+            indices = self._all if isinstance(chosen, slice) else chosen
+            self._fields.update(observations, chosen, indices, self._updated)
         self._updated[chosen] = True
 
     def stack(self, rows: np.ndarray | None = None) -> dict[str, np.ndarray]:
@@ -253,71 +258,116 @@ class FeatureHistory:
             Features, oldest first, arrays of shape (M, …).
         """
         chosen = self._chosen(rows)
-        first = ~self._stacked[chosen]
-        first = first if first.any() else None
-        stacked = {name: self._append(name, chosen, first) for name in self.features.inputs}
+        stacked: dict[str, np.ndarray] = {}
+        if self._parts:
+            scaled = _append(self._history, self._scale(chosen), chosen, self._stacked)
+            for name, part in self._parts.items():
+                stacked[name] = scaled[:, :, part].reshape(len(scaled), -1)
+        if self._fields.parts:
+            features = self._fields.features[chosen].astype(self._zone_type)
+            stacked |= {name: features[:, part] for name, part in self._fields.parts.items()}
+        if FRAME in self.features.inputs:
+            small = shrink_frames(self._frames[chosen], self.features.shrink)
+            frames = _append(self._frame_history, small, chosen, self._stacked)
+            stacked[FRAME] = np.concatenate(list(np.moveaxis(frames, 1, 0)), axis=-1)
         self._stacked[chosen] = True
-        return stacked
+        return {name: stacked[name] for name in self.features.inputs}
 
-    def _append(self, name: str, chosen: Chosen, first: np.ndarray | None) -> np.ndarray:
-        """Append the present features of an input to its histories and return these."""
-        feature, length = self._feature(name, chosen, first), self.features.history_of(name)
-        if length == 1:
-            return feature
-        filled = np.repeat(feature[:, None], length, axis=1)
-        history = self._read(f"history/{name}", chosen, filled)
-        history = _where(first, filled, np.concatenate([history[:, 1:], feature[:, None]], axis=1))
-        self._write(f"history/{name}", chosen, history)
-        return np.concatenate(list(np.moveaxis(history, 1, 0)), axis=-1)
+    def _allocate(self, observations: Observations) -> None:
+        """Make the arrays of the state for the shapes of observations."""
+        self._allocated = True
+        num_envs, length, size = len(self._updated), self.features.history, 0
+        offsets: list[float] = []
+        scales: list[float] = []
+        for name in self._scaled:
+            count = np.shape(observations[source_observation(name)])[1]
+            self._parts[name] = slice(size, size + count)
+            offset, scale = SCALES.get(name) or (0.0, DERIVED_INPUTS[name][1])
+            offsets, scales, size = offsets + [offset] * count, scales + [scale] * count, size + count
+        self._offsets, self._scales = np.array([offsets, scales], np.float32)
+        self._values = np.zeros((num_envs, size), np.float32)
+        self._last = self._values.copy()  # at the last decision
+        self._history = np.zeros((num_envs, length, size), np.float32)
+        if FRAME in self.features.inputs:
+            frames = np.asarray(observations[FRAME])
+            shape = shrink_frames(frames[:1], self.features.shrink).shape[1:]
+            self._frames = np.zeros((num_envs, *frames.shape[1:]), np.uint8)
+            self._frame_history = np.zeros((num_envs, length, *shape), np.uint8)
 
-    def _feature(self, name: str, chosen: Chosen, first: np.ndarray | None) -> np.ndarray:
-        """Return the present feature of some environments, a new array."""
-        if name in ZONE_INPUTS:
-            level, last, mean = (self._state[f"{part}/{name}"][chosen] for part in ("level", "last", "mean"))
-            parts = [weaker(level, last), mean.reshape(len(level), -1)]
-            return np.concatenate(parts, axis=1).astype(self._zone_type)
-        value = self._state[f"observation/{source_observation(name)}"][chosen]
-        if name == FRAME:
-            return shrink_frames(value, self.features.shrink)
-        if name == "speed_change":
-            last = _where(first, value, self._read("speed", chosen, value)).copy()
-            self._write("speed", chosen, value)
-            value = value - last
-        elif name == "spike_peak":
-            value = self._state["peak"][chosen]
-        offset, scale = SCALES.get(name) or (0.0, DERIVED_INPUTS[name][1])
-        return np.clip((value - offset) / scale, -CLIP, CLIP).astype(np.float32)
-
-    def _update_zone(self, name: str, chosen: Chosen, level: np.ndarray, first: np.ndarray | None) -> None:
-        """Process the levels of the fields of an input, shape (M, fields)."""
-        last = _where(first, level, self._read(f"level/{name}", chosen, level))
-        zeros = np.zeros((len(level), NUM_LEVELS - 1, level.shape[1])) if first is not None else level
-        mean = _where(first, zeros, self._read(f"mean/{name}", chosen, zeros))
-        none = np.zeros((len(level), 1, 1))
-        frames = _where(first, none, self._read(f"frames/{name}", chosen, none)) + 1.0
-        self._write(f"frames/{name}", chosen, frames)
-        self._write(f"last/{name}", chosen, last)
-        self._write(f"level/{name}", chosen, level)
-        self._write(f"mean/{name}", chosen, mean + np.maximum(GAINS, 1.0 / frames) * (level[:, None] - mean))
+    def _scale(self, chosen: Chosen) -> np.ndarray:
+        """Return the present scaled features of some environments, float32, shape (M, values)."""
+        values = self._values[chosen]
+        if "speed_change" in self._parts:
+            part, present = self._parts["speed_change"], values
+            values = present.copy()
+            changes = present[:, part] - self._last[chosen, part]
+            values[:, part] = np.where(self._stacked[chosen, None], changes, 0.0)
+            self._last[chosen] = present
+        scaled = (values - self._offsets) / self._scales
+        return np.minimum(np.maximum(scaled, -CLIP), CLIP)  # faster than np.clip
 
     def _chosen(self, rows: np.ndarray | None) -> Chosen:
         """Return the rows of arrays of the state; a slice, which makes no copies, for all of them."""
         return slice(None) if rows is None or len(rows) == len(self._updated) else rows
 
-    def _read(self, name: str, chosen: Chosen, default: np.ndarray) -> np.ndarray:
-        """Return an array of the state for some environments; the default before the first `_write`."""
-        return self._state[name][chosen] if name in self._state else default
 
-    def _write(self, name: str, chosen: Chosen, values: np.ndarray) -> None:
-        """Set an array of the state for some environments."""
-        if name not in self._state:
-            self._state[name] = np.zeros((len(self._updated), *values.shape[1:]), values.dtype)
-        self._state[name][chosen] = values
+class _Fields:
+    """Features of the inputs in `ZONE_INPUTS`, in N environments.
+
+    Args:
+        names: Names of the inputs.
+        num_envs: Number of environments N.
+
+    Attributes:
+        parts: Places of the features of each input.
+        features: Present features, float64, shape (N, features).
+    """
+
+    def __init__(self, names: list[str], num_envs: int) -> None:
+        self.parts: dict[str, slice] = {}
+        if not names:
+            return
+        from lgmd_gym.agents.policies.kernels import PART, update_fields  # imports numba, half a second
+
+        parts: list[tuple[int, int, float, bool]] = []
+        size = 0
+        for name in names:
+            source, factor, first, last = ZONE_INPUTS[name]
+            parts.append((size, last - first, factor, source in POTENTIALS))
+            self.parts[name] = slice(NUM_LEVELS * size, NUM_LEVELS * (size + last - first))
+            size += last - first
+        self._definitions, self._kernel = np.array(parts, PART), update_fields
+        self._signals, self._levels = np.zeros((2, num_envs, size))
+        self._frames, self._gains = np.zeros(num_envs), np.ascontiguousarray(GAINS[:, 0])
+        self.features = np.zeros((num_envs, NUM_LEVELS * size))
+
+    def update(
+        self, observations: Observations, chosen: Chosen, rows: np.ndarray, started: np.ndarray
+    ) -> None:
+        """Process observations of the environments `rows`, which `chosen` selects too."""
+        for name, part in self.parts.items():
+            source, _, first, last = ZONE_INPUTS[name]
+            signal = np.asarray(observations[source])
+            check_zone_shape(name, signal.shape[1:])
+            place = part.start // NUM_LEVELS
+            self._signals[chosen, place : place + last - first] = signal[chosen, first:last]
+        self._kernel(
+            self._signals, rows, started, self._definitions, self._gains, NORM,
+            self._levels, self._frames, self.features,
+        )  # fmt: skip
 
 
-def _where(first: np.ndarray | None, values: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return the values of the environments selected by `first`, else others; `first` is None for none."""
-    return others if first is None else np.where(first.reshape(-1, *[1] * (values.ndim - 1)), values, others)
+def _append(history: np.ndarray, values: np.ndarray, chosen: Chosen, started: np.ndarray) -> np.ndarray:
+    """Append values, shape (M, …), to histories, shape (N, length, …), and return those of the environments.
+
+    Values fill the histories of environments that have not started.
+    """
+    new = values[:, None]
+    if history.shape[1] == 1:
+        return new
+    old = np.concatenate([history[chosen][:, 1:], new], axis=1)
+    history[chosen] = np.where(started[chosen].reshape(-1, *[1] * values.ndim), old, new)
+    return history[chosen].copy()
 
 
 def shrink_frames(frames: np.ndarray, side: int) -> np.ndarray:
@@ -329,27 +379,6 @@ def shrink_frames(frames: np.ndarray, side: int) -> np.ndarray:
     blocks = frames[:, : rows * side, : columns * side].reshape(count, rows, side, columns, side, channels)
     means: np.ndarray = blocks.mean(axis=(2, 4), dtype=np.float32)
     return np.round(means).astype(np.uint8)
-
-
-def levels_of(name: str, signal: np.ndarray) -> np.ndarray:
-    """Return the levels of the fields of an input: its signal on a logarithmic scale, float64, (..., fields).
-
-    Membrane potentials K are converted to excitations log(K / (1 - K)). That of a direction-selective
-    neuron is negative for motion to the left, and so is its level.
-
-    Args:
-        name: A key of `ZONE_INPUTS`.
-        signal: Observation of the neurons, shape (..., cameras) or (..., columns).
-
-    Raises:
-        ValueError: If the observation comes from other cameras than the input requires.
-    """
-    check_zone_shape(name, signal.shape[-1:])
-    field = ZONE_INPUTS[name]
-    values = signal[..., field.first : field.last].astype(np.float64)
-    if field.source in POTENTIALS:
-        values = excitation(values)
-    return np.copysign(np.log1p(field.factor * np.abs(values)), values) / NORM
 
 
 def weaker(level: np.ndarray, last: np.ndarray) -> np.ndarray:

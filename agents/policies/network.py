@@ -178,21 +178,62 @@ def dense_layers(network: Any) -> "torch.nn.Sequential | None":
     return None
 
 
-def run_dense(
-    layers: "torch.nn.Sequential", names: tuple[str, ...], inputs: dict[str, np.ndarray]
-) -> np.ndarray:
-    """Return the values of the actions, float32, shape (N, actions).
+class DenseNetwork:
+    """Values of the actions of a network of dense layers.
+
+    Layers of `Linear`, `ReLU` and `Tanh` are calculated without torch, which takes half of torch's time for
+    one environment. Unlike those of torch, their values do not depend on the number of environments.
 
     Args:
-        layers: See `dense_layers`.
+        layers: See `dense_layers`. The weights are copied.
         names: Names of the inputs, in the order of the network.
-        inputs: Inputs by name, arrays of shape (N, …).
-    """
-    import torch
 
-    with torch.inference_mode():
-        flat = [torch.as_tensor(inputs[name], dtype=torch.float32).flatten(1) for name in names]
-        return layers(torch.cat(flat, dim=1)).numpy()
+    Attributes:
+        independent: Whether values do not depend on the number of environments.
+    """
+
+    def __init__(self, layers: "torch.nn.Sequential", names: tuple[str, ...]) -> None:
+        from torch import nn
+
+        self._layers, self._names = layers, names
+        functions = {nn.ReLU: _rectify, nn.Tanh: np.tanh}
+        self.independent = all(type(layer) in (nn.Linear, *functions) for layer in layers)
+        self._steps: list[tuple[np.ndarray, np.ndarray] | Any] = []
+        for layer in layers if self.independent else ():
+            if isinstance(layer, nn.Linear):
+                weights, bias = layer.weight.detach().numpy(), layer.bias.detach().numpy()
+                self._steps.append((weights.T.copy(), bias.copy()))
+            else:
+                self._steps.append(functions[type(layer)])
+
+    def __call__(self, inputs: dict[str, np.ndarray]) -> np.ndarray:
+        """Return the values of the actions, float32, shape (N, actions).
+
+        Args:
+            inputs: Inputs by name, arrays of shape (N, …).
+        """
+        flat = [inputs[name].reshape(len(inputs[name]), -1) for name in self._names]
+        values = np.ascontiguousarray(np.concatenate(flat, axis=1, dtype=np.float32))
+        if not self.independent:
+            import torch
+
+            with torch.inference_mode():
+                return self._layers(torch.from_numpy(values)).numpy()
+        from lgmd_gym.agents.policies.kernels import affine  # imports numba, half a second
+
+        for step in self._steps:
+            if isinstance(step, tuple):
+                out = np.empty((len(values), len(step[1])), np.float32)
+                affine(values, *step, out)
+                values = out
+            else:
+                step(values, out=values)
+        return values
+
+
+def _rectify(values: np.ndarray, out: np.ndarray) -> None:
+    """Replace negative values by 0."""
+    np.maximum(values, np.float32(0.0), out=out)
 
 
 def describe_network(model: "BaseAlgorithm") -> NetworkSpec | None:

@@ -20,7 +20,7 @@ from lgmd_gym.agents.policies.features import (
     check_zone_shape,
     load_normalizer,
 )
-from lgmd_gym.agents.policies.network import dense_layers, run_dense
+from lgmd_gym.agents.policies.network import DenseNetwork, dense_layers
 from lgmd_gym.agents.stages import Evidence
 from lgmd_gym.errors import check_path, check_text, check_within, shown, unknown_name
 from lgmd_gym.processes.extras import missing_extra
@@ -33,8 +33,8 @@ NOT_NEURONS = (FRAME, "ego_speed", "speed_change", "ego_yaw_rate", "ego_accelera
 RAW_INPUTS = (*SCALES, FRAME)  # observations of `LGMDObservation`
 SHIPPED = Path(__file__).parent  # folder of the policies in this package
 MAX_MARGIN = 20.0  # of log odds; the sensible range is about -4 to 4
-# The outputs of a network depend on the size of the batch, because the order of float32 sums does. The
-# differences are near 1e-6. A lead of the best action beyond this limit does not depend on them.
+# The outputs of a network that torch runs depend on the size of the batch, because the order of float32 sums
+# does. The differences are near 1e-6. A lead of the best action beyond this limit does not depend on them.
 SAFE_LEAD = 1e-3
 
 
@@ -98,8 +98,9 @@ class NormalizedInputs:
 class Policy(StagedAgent):
     """Agent that acts with a trained stable-baselines3 model, without exploration.
 
-    The network runs once for all environments. Where the two best actions are almost equal, and for
-    continuous actions, it runs for each environment by itself, so that demands do not depend on N.
+    The network runs once for all environments, and demands do not depend on N: `DenseNetwork` calculates most
+    networks in a fixed order. Others run for each environment by itself where the two best actions are almost
+    equal, and for continuous actions.
 
     With a card that has a `brake`, the actions are intervals of the time to brake, and the brake has stages,
     see `TimeToBrakeParams`. Otherwise they are demands.
@@ -149,9 +150,8 @@ class Policy(StagedAgent):
         name = self.card.vec_normalize
         self._normalizer = None if name is None else load_normalizer(file.parent / name)
         dense = dense_layers(self.network)
-        self._values = (
-            partial(action_values, self.network) if dense is None else partial(run_dense, dense, names)
-        )
+        self._values = partial(action_values, self.network) if dense is None else DenseNetwork(dense, names)
+        self._independent = isinstance(self._values, DenseNetwork) and self._values.independent
         super().__init__()
 
     def _check_network(self, file: Path, names: tuple[str, ...]) -> None:
@@ -252,7 +252,7 @@ class Policy(StagedAgent):
         assert brake is not None
         assert logits is not None  # the card was compared with the network
         evidence, safe = brake.evidence(brake.odds(logits), self._margin)
-        if len(evidence) > 1:
+        if len(evidence) > 1 and not self._independent:
             for row in np.flatnonzero(~safe).tolist():  # see `SAFE_DISTANCE`
                 alone = {name: values[row : row + 1] for name, values in inputs.items()}
                 evidence[row] = self._judge(alone)[0]
@@ -264,10 +264,12 @@ class Policy(StagedAgent):
         values = self._values(inputs) if self.card.demands and count > 1 else None
         if values is None or values.shape[1] < 2:
             return [self._decide_alone(inputs, row) for row in range(count)]
+        demands: list[float] = list(self.card.demands or ())
+        if self._independent:
+            return [demands[action] for action in values.argmax(axis=1).tolist()]
         second, best = np.sort(values, axis=1)[:, -2:].T
         safe = best - second > SAFE_LEAD * np.maximum(1.0, np.abs(values).max(axis=1))
         actions = zip(values.argmax(axis=1).tolist(), safe.tolist(), strict=True)
-        demands: list[float] = list(self.card.demands or ())
         return [
             demands[action] if certain else self._decide_alone(inputs, row)
             for row, (action, certain) in enumerate(actions)

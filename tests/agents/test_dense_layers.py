@@ -9,7 +9,7 @@ from support import policies
 from support.policies import write_policy
 
 from lgmd_gym.agents import make_agent
-from lgmd_gym.agents.policies.network import NetworkSpec, dense_layers, run_dense
+from lgmd_gym.agents.policies.network import DenseNetwork, NetworkSpec, dense_layers
 from lgmd_gym.agents.policies.policy import Policy, action_values
 
 INPUTS = {"columns": (6,), "ego_speed": (1,)}
@@ -28,7 +28,7 @@ def test_margins_between_the_actions_of_the_shipped_policy_are_the_same(count):
     inputs = {key: rng.random((count, *space.shape), np.float32) for key, space in spaces.items()}
     layers = dense_layers(policy.network)
     assert layers is not None
-    direct, reference = run_dense(layers, names, inputs), action_values(policy.network, inputs)
+    direct, reference = DenseNetwork(layers, names)(inputs), action_values(policy.network, inputs)
     assert direct.shape == reference.shape == (count, policy.network.action_space.n)
     assert np.allclose(np.diff(direct), np.diff(reference), rtol=1e-5, atol=1e-5)
 
@@ -38,8 +38,25 @@ def test_q_values_are_the_same():
     inputs = {"columns": np.ones((2, 6), np.float32), "ego_speed": np.full((2, 1), 0.5, np.float32)}
     layers = dense_layers(policy)
     assert layers is not None
-    values = run_dense(layers, ("columns", "ego_speed"), inputs)
+    values = DenseNetwork(layers, ("columns", "ego_speed"))(inputs)
     assert np.allclose(values, action_values(policy, inputs), atol=1e-6)
+
+
+@pytest.mark.parametrize("activation", ["ReLU", "Tanh", "ELU"])
+def test_values_do_not_depend_on_the_number_of_environments(activation):
+    """The number of inputs and of units does not fit the blocks of the kernel; torch runs ELU."""
+    policy = network(actions=5, net_arch={"pi": [67, 30], "vf": []}, activation_fn=activation)
+    layers = dense_layers(policy)
+    assert layers is not None
+    values, rng = DenseNetwork(layers, tuple(INPUTS)), np.random.default_rng(0)
+    assert values.independent == (activation != "ELU")
+    inputs = {name: rng.normal(size=(37, *shape)).astype(np.float32) for name, shape in INPUTS.items()}
+    together = values(inputs)
+    assert np.allclose(np.diff(together), np.diff(action_values(policy, inputs)), atol=1e-5)
+    for count in (1, 2, 3) if values.independent else ():
+        for row in range(37 - count):
+            part = values({name: item[row : row + count] for name, item in inputs.items()})
+            assert np.array_equal(part, together[row : row + count])
 
 
 def test_networks_with_frames_or_continuous_actions_are_left_to_stable_baselines3():
