@@ -189,7 +189,9 @@ class FeatureHistory:
     Call `update` at every decision of the environment and `stack` at every decision of the policy.
 
     For each field of a camera, `zones` and similar inputs have four features: the weaker level of the last
-    two frames, then the averages of the level with time constants of 0.1, 0.4 and 1.2 s, which begin at 0.
+    two frames, then averages of the level with time constants of 0.1, 0.4 and 1.2 s. An average is the mean
+    of all frames until their number reaches its time constant: averages that begin at 0 would tell a network
+    the time since the start, which predicts the threat of a scenario but of no drive.
 
     The level of a field is its signal on a logarithmic scale. Membrane potentials K are converted to
     excitations log(K / (1 - K)). That of a direction-selective neuron is negative for motion to the left, and

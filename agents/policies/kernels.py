@@ -90,15 +90,12 @@ def affine(values, weights, bias, out):
         out: Results, float32, shape (N, units).
     """
     inputs = len(weights)
-    whole, pairs = inputs - inputs % _UNROLLED, len(values) - len(values) % 2
+    whole = inputs - inputs % _UNROLLED
     for n in range(len(values)):
         _begin(values, weights, bias, whole, n, out)
     for start in range(0, whole, _BLOCK):
         end = min(start + _BLOCK, whole)
-        for n in range(0, pairs, 2):
-            for k in range(start, end, _UNROLLED):
-                _add_to_two(values, weights, k, n, out)
-        for n in range(pairs, len(values)):
+        for n in range(len(values)):
             for k in range(start, end, _UNROLLED):
                 _add(values, weights, k, n, out)
 
@@ -122,16 +119,3 @@ def _add(values, weights, k, n, out):
         w0, w1 = weights[k, unit], weights[k + 1, unit]
         w2, w3 = weights[k + 2, unit], weights[k + 3, unit]
         out[n, unit] = out[n, unit] + a0 * w0 + a1 * w1 + a2 * w2 + a3 * w3
-
-
-@kernel(inline=True)
-def _add_to_two(values, weights, k, n, out):
-    """Do what `_add` does for environments n and n + 1, which share the loads of the weights."""
-    m = n + 1
-    a0, a1, a2, a3 = values[n, k], values[n, k + 1], values[n, k + 2], values[n, k + 3]
-    b0, b1, b2, b3 = values[m, k], values[m, k + 1], values[m, k + 2], values[m, k + 3]
-    for unit in range(weights.shape[1]):
-        w0, w1 = weights[k, unit], weights[k + 1, unit]
-        w2, w3 = weights[k + 2, unit], weights[k + 3, unit]
-        out[n, unit] = out[n, unit] + a0 * w0 + a1 * w1 + a2 * w2 + a3 * w3
-        out[m, unit] = out[m, unit] + b0 * w0 + b1 * w1 + b2 * w2 + b3 * w3
