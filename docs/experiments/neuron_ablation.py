@@ -160,7 +160,7 @@ def with_levels(episode: DrivenEpisode) -> DrivenEpisode:
 def levels_of(signals: Observation) -> Observation:
     """Return the levels of the detectors by name, float16, (T, columns or fields), and the ego's motion.
 
-    Levels are those of `lgmd_gym.agents.policies.features.levels_of`; those of pixels are linear.
+    Levels are those of `FeatureHistory`; those of pixels are linear.
     """
     columns, levels = excitation(signals["column_potential"]), dict[str, np.ndarray]()
     fields, frequency = excitation(signals["membrane_potential"]), signals["spike_frequency"]
