@@ -27,6 +27,7 @@ FLOATS = ir.VectorType(ir.FloatType(), LANES)
 INTS = ir.VectorType(ir.IntType(32), LANES)
 _BYTES = ir.VectorType(ir.IntType(8), LANES)
 ZEROS = ir.Constant(FLOATS, [0.0] * LANES)
+_NO_BYTES = ir.Constant(_BYTES, [0] * LANES)
 
 
 class Float32x16(types.Type):
@@ -75,6 +76,11 @@ def _pointer(context, builder, array_type, array, index, kind):
     return builder.bitcast(builder.gep(data, [index]), kind.as_pointer())
 
 
+def _to_floats(builder, lanes):
+    """Emit bytes as float32, via int32, from which the conversion is one instruction on all machines."""
+    return builder.sitofp(builder.zext(lanes, INTS), FLOATS)
+
+
 @intrinsic
 def load(typingctx, array, index):
     """Load array[index : index + 16] of a float32 or uint8 array."""
@@ -85,8 +91,7 @@ def load(typingctx, array, index):
         pointer = _pointer(context, builder, signature.args[0], args[0], args[1], kind)
         lanes = builder.load(pointer)
         lanes.align = 1 if is_byte else 4
-        # Via int32, from which the conversion is one instruction on all machines.
-        return builder.sitofp(builder.zext(lanes, INTS), FLOATS) if is_byte else lanes
+        return _to_floats(builder, lanes) if is_byte else lanes
 
     return vector(array, types.intp), codegen
 
@@ -114,12 +119,16 @@ def _first_lanes(builder, count):
 
 @intrinsic
 def load_masked(typingctx, array, index, count):
-    """Load the first `count` lanes, at most 16, from array[index] of a float32 array; the others are 0."""
+    """Load the first `count` lanes, at most 16, from array[index] as `load` does; the others are 0."""
 
     def codegen(context, builder, signature, args):
-        pointer = _pointer(context, builder, signature.args[0], args[0], args[1], FLOATS)
-        align, mask = ir.Constant(ir.IntType(32), 4), _first_lanes(builder, args[2])
-        return call(builder, f"llvm.masked.load.v{LANES}f32.p0", pointer, align, mask, ZEROS)
+        is_byte = signature.args[0].dtype == types.uint8
+        kind, name, align = (_BYTES, "i8", 1) if is_byte else (FLOATS, "f32", 4)
+        pointer = _pointer(context, builder, signature.args[0], args[0], args[1], kind)
+        name, mask = f"llvm.masked.load.v{LANES}{name}.p0", _first_lanes(builder, args[2])
+        zeros = _NO_BYTES if is_byte else ZEROS
+        lanes = call(builder, name, pointer, ir.Constant(ir.IntType(32), align), mask, zeros, result=kind)
+        return _to_floats(builder, lanes) if is_byte else lanes
 
     return vector(array, types.intp, types.intp), codegen
 
@@ -365,7 +374,7 @@ _overload_operator(operator.rshift, _elementwise(2, lambda b, x, y: b.lshr(x, y)
 
 @register_jitable
 def load_part(array, index, count):
-    """Load array[index : index + count] of a float32 array, at most 16 elements; the other lanes are 0."""
+    """Load array[index : index + count] of a float32 or uint8 array, at most 16; the other lanes are 0."""
     return load(array, index) if count >= LANES else load_masked(array, index, count)
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from lgmd_gym.fields import number, record
 from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import LANES, load_part, magnitude, splat, store_part, total
 from lgmd_gym.neuron.base import Layer
 from lgmd_gym.neuron.lgmd.params import NeuronSpec
 from lgmd_gym.neuron.motion import ModelParams, MotionNeuron, register_model, start
@@ -100,6 +101,26 @@ class SustainedEdges(MotionNeuron):
 
 
 @kernel(exact=True, arrays=True)
+def _find_edges(frame, light, edges, gain):
+    """Update the light and write the edges; return their sum."""
+    height, width = light.shape
+    rate, sums = splat(gain), 0.0
+    for y in range(height):
+        first, strength = y * width, splat(np.float32(0.0))
+        for x in range(0, width, LANES):
+            past = load_part(light, first + x, width - x)
+            change = rate * (load_part(frame, first + x, width - x) - past)
+            store_part(light, first + x, width - x, past + change)
+        for x in range(0, width - 1, LANES):
+            at, count = first + x, width - 1 - x
+            edge = magnitude(load_part(light, at + 1, count) - load_part(light, at, count))
+            store_part(edges, at, count, edge)
+            strength = strength + edge
+        sums += total(strength)
+    return sums
+
+
+@kernel(exact=True, arrays=True)
 def _step(first, last, frames, active, scalars, const, gain, light, edges) -> None:
     """Step the active detectors among first..last-1.
 
@@ -123,14 +144,7 @@ def _step(first, last, frames, active, scalars, const, gain, light, edges) -> No
             start(frames[n], light[n])
             row[AGE] = 1.0
             continue
-        total = 0.0
-        for y in range(height):
-            for x in range(width):
-                light[n, y, x] += gain * (np.float32(frames[n, y, x]) - light[n, y, x])
-            for x in range(width - 1):
-                edges[n, y, x] = abs(light[n, y, x + 1] - light[n, y, x])
-                total += edges[n, y, x]
-        mean = total / (height * width)
+        mean = _find_edges(frames[n], light[n], edges[n], gain) / (height * width)
         row[F], row[W], row[LATENCY], row[GAIN_G] = mean, 0.0, 0.0, 1.0
         fire(row, const, mean)
 

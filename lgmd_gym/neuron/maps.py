@@ -12,8 +12,10 @@ state, see `scalars`, (N, ...); and the shift of each neuron, + for a turn to th
 
 import math
 
+import numpy as np
+
 from lgmd_gym.kernels import kernel
-from lgmd_gym.kernels.simd import LANES
+from lgmd_gym.kernels.simd import LANES, load_part, splat, total
 from lgmd_gym.neuron.scalars import AGE
 
 
@@ -89,14 +91,16 @@ def column_potentials(first, last, active, maps, width, sigma, out) -> None:
         sigma: Mean at which K_c = 0.73.
         out: Output, float64, shape (N, columns).
     """
-    height, columns = maps.shape[1], out.shape[1]
+    height, columns, stride = maps.shape[1], out.shape[1], maps.shape[2]
     span = width // columns
     for n in range(first, last):
         if not active[n]:
             continue
+        values = maps[n]
         for column in range(columns):
-            total = 0.0
-            for y in range(height):
-                for x in range(column * span, (column + 1) * span):
-                    total += maps[n, y, x]
-            out[n, column] = 1.0 / (1.0 + math.exp(-total / (height * span * sigma)))
+            sums = splat(np.float32(0.0))
+            for x in range(0, span, LANES):
+                at = column * span + x
+                for y in range(height):
+                    sums = sums + load_part(values, y * stride + at, span - x)
+            out[n, column] = 1.0 / (1.0 + math.exp(-total(sums) / (height * span * sigma)))

@@ -5,7 +5,6 @@
 Equation numbers are those in the docstring of `LPLC2`.
 """
 
-import math
 from collections.abc import Callable
 from typing import ClassVar
 
@@ -14,6 +13,17 @@ from numpy.typing import NDArray
 
 from lgmd_gym.fields import Record, declarations, number, record
 from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import (
+    LANES,
+    load_part,
+    magnitude,
+    maximum,
+    select_by_sign,
+    splat,
+    square_root,
+    store_part,
+    total,
+)
 from lgmd_gym.neuron.base import FrameNeuron, Signal, spiking_signals
 from lgmd_gym.neuron.lgmd.params import LGMDParams, NeuronSpec
 from lgmd_gym.neuron.maps import shift_light, shift_rows
@@ -136,51 +146,66 @@ def start(frame, mean):
 @kernel(exact=True, arrays=True)
 def filter_light(frame, mean, on, off, gain):
     """Subtract the mean light and split the difference into ON and OFF (eq. 1 and 2)."""
-    height, width = mean.shape
-    for y in range(height):
-        for x in range(width):
-            change = np.float32(frame[y, x]) - mean[y, x]
-            mean[y, x] += gain * change
-            on[y, x], off[y, x] = max(change, np.float32(0.0)), max(-change, np.float32(0.0))
+    zero, rate = splat(np.float32(0.0)), splat(gain)
+    pixels = mean.size
+    for at in range(0, pixels, LANES):
+        count = pixels - at
+        light = load_part(mean, at, count)
+        change = load_part(frame, at, count) - light
+        store_part(mean, at, count, light + rate * change)
+        store_part(on, at, count, maximum(change, zero))
+        store_part(off, at, count, maximum(zero - change, zero))
 
 
 @kernel(exact=True, inline=True, arrays=True)
-def _compressed(correlation):
-    """Return the signed square root."""
-    return math.copysign(math.sqrt(abs(correlation)), correlation)
+def _correlation(on, off, late_on, late_off, at, step, count):
+    """Return m of `count` pixels from index `at` on, each with that `step` pixels after it (eq. 4)."""
+    near = load_part(late_on, at, count) * load_part(on, at + step, count)
+    value = near - load_part(on, at, count) * load_part(late_on, at + step, count)
+    near = load_part(late_off, at, count) * load_part(off, at + step, count)
+    value = value + (near - load_part(off, at, count) * load_part(late_off, at + step, count))
+    root = square_root(magnitude(value))
+    return select_by_sign(value, root, splat(np.float32(0.0)) - root)
 
 
 @kernel(exact=True, arrays=True)
 def detect_motion_right(on, off, late_on, late_off, right):
     """Correlate each pixel with the next one to the right (eq. 4); return the sums of m and |m|."""
     height, width = on.shape
-    total = strength = 0.0
+    sum_motion = sum_strength = 0.0
     for y in range(height):
-        for x in range(width - 1):
-            value = late_on[y, x] * on[y, x + 1] - on[y, x] * late_on[y, x + 1]
-            value += late_off[y, x] * off[y, x + 1] - off[y, x] * late_off[y, x + 1]
-            right[y, x] = _compressed(value)
-            total += right[y, x]
-            strength += abs(right[y, x])
-    return total, strength
+        motion = strength = splat(np.float32(0.0))
+        for x in range(0, width - 1, LANES):
+            at, count = y * width + x, width - 1 - x
+            value = _correlation(on, off, late_on, late_off, at, 1, count)
+            store_part(right, at, count, value)
+            motion, strength = motion + value, strength + magnitude(value)
+        sum_motion, sum_strength = sum_motion + total(motion), sum_strength + total(strength)
+    return sum_motion, sum_strength
 
 
 @kernel(exact=True, arrays=True)
 def detect_motion_down(on, off, late_on, late_off, down):
     """Correlate each pixel with the next one below (eq. 4)."""
     height, width = on.shape
-    for y in range(height - 1):
-        for x in range(width):
-            value = late_on[y, x] * on[y + 1, x] - on[y, x] * late_on[y + 1, x]
-            value += late_off[y, x] * off[y + 1, x] - off[y, x] * late_off[y + 1, x]
-            down[y, x] = _compressed(value)
+    pixels = (height - 1) * width
+    for at in range(0, pixels, LANES):
+        count = pixels - at
+        store_part(down, at, count, _correlation(on, off, late_on, late_off, at, width, count))
+
+
+@kernel(exact=True, inline=True, arrays=True)
+def _approach(values, target, at, count, rate):
+    """Move sixteen values, at most `count`, from index `at` on towards those of another map by a share."""
+    past = load_part(values, at, count)
+    store_part(values, at, count, past + rate * (load_part(target, at, count) - past))
 
 
 @kernel(exact=True, arrays=True)
 def update_delay(on, off, late_on, late_off, gain):
     """Update the delayed ON and OFF (eq. 3)."""
-    height, width = on.shape
-    for y in range(height):
-        for x in range(width):
-            late_on[y, x] += gain * (on[y, x] - late_on[y, x])
-            late_off[y, x] += gain * (off[y, x] - late_off[y, x])
+    rate, pixels = splat(gain), on.size
+    for at in range(0, pixels, LANES):
+        count = pixels - at
+        _approach(late_on, on, at, count, rate)
+        _approach(late_off, off, at, count, rate)
