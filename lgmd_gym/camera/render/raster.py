@@ -44,7 +44,7 @@ from lgmd_gym.camera.render.sensor import (
     move_objects,
     overwrite,
 )
-from lgmd_gym.camera.render.shadows import add_cast_shadows, add_shadow
+from lgmd_gym.camera.render.shadows import add_cast_shadows, add_shadow, find_casters
 from lgmd_gym.camera.render.sky import draw_panorama, draw_sky
 from lgmd_gym.camera.render.solids import Air, draw_object
 from lgmd_gym.camera.render.tables import tables_at
@@ -152,7 +152,7 @@ def draw_light(view, road, tables, models, seen, member, vehicles, buffers):
     )
     add_flats(ground, view, road, seen, n, member, clock)
     if view.look.cast > 0.0:
-        add_cast_shadows(ground, view, seen.objects, vehicles, road.roadside)
+        add_cast_shadows(ground, view, seen, road.roadside)
     mark(clock, CAST_SHADOWS)
     draw_ground(image, view, buffers.ground, tables, horizon)
     mark(clock, GROUND)
@@ -200,6 +200,7 @@ def draw_frame(frame, view, opening, road, tables, models, seen, member, vehicle
             move_objects(seen.objects, vehicles, -ago * look.shutter_s)
             aim_frustum(moment, seen.frusta[0])
             see(1, moment.focal, road.roadside, look, models.lamps, vehicles, seen)
+            find_casters(moment, look, vehicles, road.roadside, seen)
             present = View(
                 lens=moment,
                 look=look,
@@ -295,6 +296,7 @@ def _see_from(lenses, mount, objects, count, roadside, look, lamps, seen):
         aim_frustum(lenses[k, 0], seen.frusta[k])
         focal = min(focal, lenses[k, 0].focal)
     vehicles = choose_objects(seen.frusta, n, mount, objects, count, seen.objects)
+    find_casters(lenses[0, 0], look, vehicles, roadside, seen)
     return vehicles, see(n, focal, roadside, look, lamps, vehicles, seen)
 
 

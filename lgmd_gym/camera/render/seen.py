@@ -37,6 +37,10 @@ in the frame [m], infinite above the horizon; the plane through the lens and the
 MAX_SEEN = 2 * MAX_DRAWN
 """Maximum number of objects that the lenses of an eye see."""
 
+CASTER = np.dtype([("index", np.int64), *((name, np.float64) for name in ("x", "y", "radius", "weight"))])
+"""An object with a cast shadow: its index in `Seen.objects`, or in the roadside plus `MAX_SEEN`; centre of a
+circle around the object and its shadow relative to the eye, and its radius [m]; weight of the shadow."""
+
 
 class Seen(NamedTuple):
     """What the lenses of an eye see; arrays of shape (1024, …) have a row per object."""
@@ -53,7 +57,9 @@ class Seen(NamedTuple):
     faces: np.ndarray
     polygons: np.ndarray  # polygons of the objects that are turned towards the eye, int64
     lights: np.ndarray  # light on them, without headlights, float64
-    counts: np.ndarray  # numbers of objects, of those in `order`, and of `polygons` in use, int64, shape (3,)
+    casters: np.ndarray  # `CASTER` records, see `shadows.find_casters`
+    # numbers of objects, of those in `order`, of `polygons` in use, and of casters, int64, shape (4,)
+    counts: np.ndarray
 
 
 def make_seen(polygons: int) -> Seen:
@@ -68,7 +74,8 @@ def make_seen(polygons: int) -> Seen:
         faces=np.zeros((MAX_SEEN, 2), np.int64),
         polygons=np.zeros(MAX_SEEN * polygons, np.int64),
         lights=np.zeros(MAX_SEEN * polygons),
-        counts=np.zeros(3, np.int64),
+        casters=np.zeros(MAX_SEEN, CASTER),
+        counts=np.zeros(4, np.int64),
     )
 
 

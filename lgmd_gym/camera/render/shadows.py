@@ -26,7 +26,7 @@ from lgmd_gym.camera.objects import (
 )
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, winding
 from lgmd_gym.camera.render.ground import CAST, PAINT, SHADOW, add_ground_quad
-from lgmd_gym.camera.render.seen import beside, distance, first_from, outside_band
+from lgmd_gym.camera.render.seen import MAX_SEEN, beside, distance, first_from, outside_band
 from lgmd_gym.kernels import kernel
 
 # Legs and wheels keep less of the sky's light from the road than a body close above it.
@@ -114,43 +114,70 @@ _MOST_SHIFT = 8.0  # length of a shadow per height; at lower elevations of the s
 
 
 @kernel
-def add_cast_shadows(layer, view, objects, count, roadside):
-    """Add the cast shadows of the first `count` objects and of the roadside within range.
+def find_casters(eye, look, vehicles, roadside, seen):
+    """Find the objects whose cast shadows the lenses of an eye may see, and write them to `seen`.
 
-    Marks have none. Boxes and barriers have their soft shadow only.
+    Marks cast none. Boxes and barriers have their soft shadow only.
     """
-    lens, look = view.lens, view.look
-    stretch = min(1.0 / look.sun_z, _MOST_SHIFT)
-    away = (-look.sun_x * stretch, -look.sun_y * stretch)
-    for i in range(count):
-        # With a shutter, the objects are those that are not behind the lens at the end of the exposure.
-        hidden = view.look.shutter_s == 0.0 and behind(layer.frustum, objects[i])
-        if objects[i].model != MODEL_MARK and not hidden:
-            _add_shadow_of(layer, lens, objects[i], away)
-    n, low = roadside.shape[0], first_from(roadside, lens.x - _FADE_END)
-    while low < n and roadside[low].x < lens.x + _FADE_END:
-        if roadside[low].model != MODEL_MARK:
-            _add_shadow_of(layer, lens, roadside[low], away)
-        low += 1
+    count, out = 0, seen.casters
+    if look.cast > 0.0:
+        away = _shift_per_metre(look)
+        for i in range(vehicles):
+            count += _note_caster(eye, seen.objects[i], i, away, out, count)
+        n, low = roadside.shape[0], first_from(roadside, eye.x - _FADE_END)
+        while low < n and roadside[low].x < eye.x + _FADE_END and count < out.shape[0]:
+            count += _note_caster(eye, roadside[low], MAX_SEEN + low, away, out, count)
+            low += 1
+    seen.counts[3] = count
 
 
 @kernel
-def _add_shadow_of(layer, lens, obj, away):
-    """Add the shadow of one object; `away` is the shift of a point 1 m above the ground [m]."""
-    if obj.model == MODEL_BOX or obj.model == MODEL_BARRIER:
-        return
-    dx, dy = obj.x - lens.x, obj.y - lens.y
+def _shift_per_metre(look):
+    """Return the shift of a point's shadow per metre of its height [m]."""
+    stretch = min(1.0 / look.sun_z, _MOST_SHIFT)
+    return -look.sun_x * stretch, -look.sun_y * stretch
+
+
+@kernel
+def _note_caster(eye, obj, index, away, casters, count):
+    """Write an object with a cast shadow to row `count` of `casters`; returns the number written, 0 or 1."""
+    if obj.model == MODEL_MARK or obj.model == MODEL_BOX or obj.model == MODEL_BARRIER:
+        return 0
+    dx, dy = obj.x - eye.x, obj.y - eye.y
     distance = math.sqrt(dx * dx + dy * dy)
     if distance > _FADE_END:
-        return
+        return 0
     # A circle around the object and its shadow.
     shift = obj.height * math.sqrt(away[0] * away[0] + away[1] * away[1])
-    mx, my = dx + 0.5 * obj.height * away[0], dy + 0.5 * obj.height * away[1]
-    radius = 0.5 * (obj.length + obj.width + shift)
-    ahead, across = mx * lens.cos_yaw + my * lens.sin_yaw, my * lens.cos_yaw - mx * lens.sin_yaw
-    if outside_band(layer.frustum, ahead, radius) or beside(layer.frustum, ahead, across, radius):
-        return
-    weight = min(1.0, (_FADE_END - distance) / (_FADE_END - _FADE_START))
+    caster = casters[count]
+    caster.index = index
+    caster.x, caster.y = dx + 0.5 * obj.height * away[0], dy + 0.5 * obj.height * away[1]
+    caster.radius = 0.5 * (obj.length + obj.width + shift)
+    caster.weight = min(1.0, (_FADE_END - distance) / (_FADE_END - _FADE_START))
+    return 1
+
+
+@kernel
+def add_cast_shadows(layer, view, seen, roadside):
+    """Add the cast shadows that a lens sees; see `find_casters`."""
+    lens, look, frustum = view.lens, view.look, layer.frustum
+    away = _shift_per_metre(look)
+    for i in range(seen.counts[3]):
+        caster = seen.casters[i]
+        ahead = caster.x * lens.cos_yaw + caster.y * lens.sin_yaw
+        across = caster.y * lens.cos_yaw - caster.x * lens.sin_yaw
+        if outside_band(frustum, ahead, caster.radius) or beside(frustum, ahead, across, caster.radius):
+            continue
+        if caster.index >= MAX_SEEN:
+            _add_shadow_of(layer, lens, roadside[caster.index - MAX_SEEN], away, caster.weight)
+        # With a shutter, the objects are those that are not behind the lens at the end of the exposure.
+        elif look.shutter_s > 0.0 or not behind(frustum, seen.objects[caster.index]):
+            _add_shadow_of(layer, lens, seen.objects[caster.index], away, caster.weight)
+
+
+@kernel
+def _add_shadow_of(layer, lens, obj, away, weight):
+    """Add the shadow of one object; `away` is the shift of a point 1 m above the ground [m]."""
     if obj.model == MODEL_TREE:
         n = _crown_outline(layer, lens, obj, away)
         _add_outline(layer, lens, n, weight)
