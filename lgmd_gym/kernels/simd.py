@@ -70,7 +70,7 @@ def call(builder, name, *args, result: ir.Type = FLOATS):
     return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), args)
 
 
-def _pointer(context, builder, array_type, array, index, kind):
+def pointer_to(context, builder, array_type, array, index, kind):
     """Return the address of an element of a C-contiguous array, as a pointer to a vector of `kind`."""
     data = cgutils.create_struct_proxy(array_type)(context, builder, array).data
     return builder.bitcast(builder.gep(data, [index]), kind.as_pointer())
@@ -88,7 +88,7 @@ def load(typingctx, array, index):
     def codegen(context, builder, signature, args):
         is_byte = signature.args[0].dtype == types.uint8
         kind = _BYTES if is_byte else FLOATS
-        pointer = _pointer(context, builder, signature.args[0], args[0], args[1], kind)
+        pointer = pointer_to(context, builder, signature.args[0], args[0], args[1], kind)
         lanes = builder.load(pointer)
         lanes.align = 1 if is_byte else 4
         return _to_floats(builder, lanes) if is_byte else lanes
@@ -101,7 +101,7 @@ def store(typingctx, array, index, value):
     """Store the lanes to array[index : index + 16] of a float32 array."""
 
     def codegen(context, builder, signature, args):
-        pointer = _pointer(context, builder, signature.args[0], args[0], args[1], FLOATS)
+        pointer = pointer_to(context, builder, signature.args[0], args[0], args[1], FLOATS)
         builder.store(args[2], pointer).align = 4
         return context.get_dummy_value()
 
@@ -124,7 +124,7 @@ def load_masked(typingctx, array, index, count):
     def codegen(context, builder, signature, args):
         is_byte = signature.args[0].dtype == types.uint8
         kind, name, align = (_BYTES, "i8", 1) if is_byte else (FLOATS, "f32", 4)
-        pointer = _pointer(context, builder, signature.args[0], args[0], args[1], kind)
+        pointer = pointer_to(context, builder, signature.args[0], args[0], args[1], kind)
         name, mask = f"llvm.masked.load.v{LANES}{name}.p0", _first_lanes(builder, args[2])
         zeros = _NO_BYTES if is_byte else ZEROS
         lanes = call(builder, name, pointer, ir.Constant(ir.IntType(32), align), mask, zeros, result=kind)
@@ -138,7 +138,7 @@ def store_masked(typingctx, array, index, count, value):
     """Store the first `count` lanes, at most 16, to array[index] of a float32 array."""
 
     def codegen(context, builder, signature, args):
-        pointer = _pointer(context, builder, signature.args[0], args[0], args[1], FLOATS)
+        pointer = pointer_to(context, builder, signature.args[0], args[0], args[1], FLOATS)
         align, mask = ir.Constant(ir.IntType(32), 4), _first_lanes(builder, args[2])
         name = f"llvm.masked.store.v{LANES}f32.p0"
         return call(builder, name, args[3], pointer, align, mask, result=ir.VoidType())
@@ -154,7 +154,7 @@ def store_bytes(typingctx, array, index, count, value):
     """
 
     def codegen(context, builder, signature, args):
-        pointer = _pointer(context, builder, signature.args[0], args[0], args[1], _BYTES)
+        pointer = pointer_to(context, builder, signature.args[0], args[0], args[1], _BYTES)
         lanes = builder.trunc(builder.fptosi(args[3], INTS), _BYTES)
         align, mask = ir.Constant(ir.IntType(32), 1), _first_lanes(builder, args[2])
         name = f"llvm.masked.store.v{LANES}i8.p0"
@@ -175,8 +175,8 @@ def copy(typingctx, source, source_index, target, target_index):
 
     def codegen(context, builder, signature, args):
         kind, align = (_BYTES, 1) if signature.args[0].dtype == types.uint8 else (FLOATS, 4)
-        lanes = builder.load(_pointer(context, builder, signature.args[0], args[0], args[1], kind))
-        target = _pointer(context, builder, signature.args[2], args[2], args[3], kind)
+        lanes = builder.load(pointer_to(context, builder, signature.args[0], args[0], args[1], kind))
+        target = pointer_to(context, builder, signature.args[2], args[2], args[3], kind)
         lanes.align = builder.store(lanes, target).align = align
         return context.get_dummy_value()
 
@@ -244,7 +244,7 @@ def gather_words(typingctx, array, indices):
     return integers(array, integers), codegen
 
 
-def _elementwise(arity, emit, kind=vector, result_kind=None):
+def elementwise(arity, emit, kind=vector, result_kind=None):
     """Return an intrinsic of `arity` vectors, given the function that emits its instructions."""
     signature = (result_kind or kind)(*[kind] * arity)
     result = signature, lambda context, builder, signature, args: emit(builder, *args)
@@ -260,31 +260,31 @@ def _abs(builder, x):
     return call(builder, f"llvm.fabs.v{LANES}f32", x)
 
 
-_add = _elementwise(2, lambda b, x, y: b.fadd(x, y))
-_sub = _elementwise(2, lambda b, x, y: b.fsub(x, y))
-_mul = _elementwise(2, lambda b, x, y: b.fmul(x, y))
-_div = _elementwise(2, lambda b, x, y: b.fdiv(x, y))
+_add = elementwise(2, lambda b, x, y: b.fadd(x, y))
+_sub = elementwise(2, lambda b, x, y: b.fsub(x, y))
+_mul = elementwise(2, lambda b, x, y: b.fmul(x, y))
+_div = elementwise(2, lambda b, x, y: b.fdiv(x, y))
 # x * y + z, with a single rounding if the machine supports it.
-madd = _elementwise(3, lambda b, x, y, z: call(b, f"llvm.fmuladd.v{LANES}f32", x, y, z))
+madd = elementwise(3, lambda b, x, y, z: call(b, f"llvm.fmuladd.v{LANES}f32", x, y, z))
 # |x|.
-magnitude = _elementwise(1, _abs)
+magnitude = elementwise(1, _abs)
 # √x; no lane may be negative.
-square_root = _elementwise(1, lambda b, x: call(b, f"llvm.sqrt.v{LANES}f32", x))
+square_root = elementwise(1, lambda b, x: call(b, f"llvm.sqrt.v{LANES}f32", x))
 # Larger of both lanes; neither may be NaN.
-maximum = _elementwise(2, lambda b, x, y: b.select(b.fcmp_ordered(">", x, y), x, y))
+maximum = elementwise(2, lambda b, x, y: b.select(b.fcmp_ordered(">", x, y), x, y))
 # x where x >= limit, else 0.
-at_least = _elementwise(2, lambda b, x, limit: b.select(b.fcmp_ordered(">=", x, limit), x, ZEROS))
+at_least = elementwise(2, lambda b, x, limit: b.select(b.fcmp_ordered(">=", x, limit), x, ZEROS))
 # x where |x| >= limit, else 0.
-clear_below = _elementwise(2, lambda b, x, limit: b.select(b.fcmp_ordered(">=", _abs(b, x), limit), x, ZEROS))
+clear_below = elementwise(2, lambda b, x, limit: b.select(b.fcmp_ordered(">=", _abs(b, x), limit), x, ZEROS))
 # x where sign >= 0, else y.
-select_by_sign = _elementwise(3, lambda b, sign, x, y: b.select(b.fcmp_ordered(">=", sign, ZEROS), x, y))
+select_by_sign = elementwise(3, lambda b, sign, x, y: b.select(b.fcmp_ordered(">=", sign, ZEROS), x, y))
 # Smaller of both lanes; neither may be NaN.
-minimum = _elementwise(2, lambda b, x, y: b.select(b.fcmp_ordered("<", x, y), x, y))
+minimum = elementwise(2, lambda b, x, y: b.select(b.fcmp_ordered("<", x, y), x, y))
 # y where x > limit, else x.
-replace_above = _elementwise(3, lambda b, x, limit, y: b.select(b.fcmp_ordered(">", x, limit), y, x))
-as_floats = _elementwise(1, lambda b, x: b.sitofp(x, FLOATS), integers, vector)
+replace_above = elementwise(3, lambda b, x, limit, y: b.select(b.fcmp_ordered(">", x, limit), y, x))
+as_floats = elementwise(1, lambda b, x: b.sitofp(x, FLOATS), integers, vector)
 # Rounded towards 0; the lanes are within the range of int32.
-as_integers = _elementwise(1, lambda b, x: b.fptosi(x, INTS), vector, integers)
+as_integers = elementwise(1, lambda b, x: b.fptosi(x, INTS), vector, integers)
 
 
 @intrinsic
@@ -352,7 +352,7 @@ def largest(typingctx, a):
     return types.float32(vector), codegen
 
 
-def _overload_operator(symbol, function, kind=vector) -> None:
+def overload_operator(symbol, function, kind=vector) -> None:
     """Make a Python operator of two vectors call an intrinsic."""
 
     @overload(symbol)
@@ -360,16 +360,16 @@ def _overload_operator(symbol, function, kind=vector) -> None:
         return (lambda a, b: function(a, b)) if a == kind and b == kind else None
 
 
-_overload_operator(operator.add, _add)
-_overload_operator(operator.sub, _sub)
-_overload_operator(operator.mul, _mul)
-_overload_operator(operator.truediv, _div)
-_overload_operator(operator.add, _elementwise(2, lambda b, x, y: b.add(x, y), integers), integers)
-_overload_operator(operator.mul, _elementwise(2, lambda b, x, y: b.mul(x, y), integers), integers)
-_overload_operator(operator.and_, _elementwise(2, lambda b, x, y: b.and_(x, y), integers), integers)
-_overload_operator(operator.lshift, _elementwise(2, lambda b, x, y: b.shl(x, y), integers), integers)
+overload_operator(operator.add, _add)
+overload_operator(operator.sub, _sub)
+overload_operator(operator.mul, _mul)
+overload_operator(operator.truediv, _div)
+overload_operator(operator.add, elementwise(2, lambda b, x, y: b.add(x, y), integers), integers)
+overload_operator(operator.mul, elementwise(2, lambda b, x, y: b.mul(x, y), integers), integers)
+overload_operator(operator.and_, elementwise(2, lambda b, x, y: b.and_(x, y), integers), integers)
+overload_operator(operator.lshift, elementwise(2, lambda b, x, y: b.shl(x, y), integers), integers)
 # Fills with zeros: the lanes are read as unsigned numbers.
-_overload_operator(operator.rshift, _elementwise(2, lambda b, x, y: b.lshr(x, y), integers), integers)
+overload_operator(operator.rshift, elementwise(2, lambda b, x, y: b.lshr(x, y), integers), integers)
 
 
 @register_jitable

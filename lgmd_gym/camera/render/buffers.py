@@ -54,8 +54,8 @@ class Buffers(NamedTuple):
     ground: np.ndarray
     # coverage differences of a solid and of its grey, float32, shape (2, height, width + 2)
     solids: np.ndarray
-    corners: np.ndarray  # corners of a polygon as (depth, right, down), float64, shape (16, 3) [m]
-    uv: np.ndarray  # projected corners of a polygon, float64, shape (20, 2) [px]
+    corners: np.ndarray  # corners of a polygon as (depth, right, down), float64, shape (3, 16) [m]
+    uv: np.ndarray  # projected corners of a polygon, float64, shape (2, 20) [px]
     quad: np.ndarray  # x, y of four corners on the ground, float64, shape (8,) [m]
     axes: np.ndarray  # axes of an object, see `place_object`, float64, shape (5, 3)
     greys: np.ndarray  # grey and light of the polygons of all models, float64, shape (polygons, 2)
@@ -98,8 +98,8 @@ def make_buffers(shape: tuple[int, int], polygons: int) -> Buffers:
         lens=np.zeros(1, dtype=LENS),
         ground=np.zeros((4, height, width + 2), dtype=np.float32),
         solids=np.zeros((2, height, width + 2), dtype=np.float32),
-        corners=np.zeros((16, 3)),
-        uv=np.zeros((20, 2)),
+        corners=np.zeros((3, 16)),
+        uv=np.zeros((2, 20)),
         quad=np.zeros(8),
         axes=np.zeros((5, 3)),
         greys=np.zeros((polygons, 2)),

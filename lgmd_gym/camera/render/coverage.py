@@ -242,27 +242,27 @@ def clip_and_project(lens, corners, n, out):
 
     Args:
         lens: The lens.
-        corners: Corners as (depth, right, down), float64, shape (>= n, 3) [m].
+        corners: Corners as (depth, right, down), float64, shape (3, >= n) [m].
         n: Number of corners.
-        out: Output: projected corners (u, v), shape (> n, 2) [px].
+        out: Output: projected corners (u, v), shape (2, > n) [px].
 
     Returns:
         Number of projected corners; 0 if the polygon is entirely behind the near plane.
     """
     f, cu, cv = lens.focal, lens.centre_u, lens.centre_v
     m = 0
-    d0, r0, z0 = corners[n - 1, 0], corners[n - 1, 1], corners[n - 1, 2]
+    d0, r0, z0 = corners[0, n - 1], corners[1, n - 1], corners[2, n - 1]
     for i in range(n):
-        d1, r1, z1 = corners[i, 0], corners[i, 1], corners[i, 2]
+        d1, r1, z1 = corners[0, i], corners[1, i], corners[2, i]
         if (d0 >= NEAR) != (d1 >= NEAR):
             t = (NEAR - d0) / (d1 - d0)
-            out[m, 0] = cu + f * (r0 + t * (r1 - r0)) / NEAR
-            out[m, 1] = cv + f * (z0 + t * (z1 - z0)) / NEAR
+            out[0, m] = cu + f * (r0 + t * (r1 - r0)) / NEAR
+            out[1, m] = cv + f * (z0 + t * (z1 - z0)) / NEAR
             m += 1
         if d1 >= NEAR:
             scale = f / d1
-            out[m, 0] = cu + scale * r1
-            out[m, 1] = cv + scale * z1
+            out[0, m] = cu + scale * r1
+            out[1, m] = cv + scale * z1
             m += 1
         d0, r0, z0 = d1, r1, z1
     return m
@@ -274,7 +274,7 @@ def winding(uv, n):
     area = 0.0
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
-        area += uv[j, 0] * uv[i, 1] - uv[i, 0] * uv[j, 1]
+        area += uv[0, j] * uv[1, i] - uv[0, i] * uv[1, j]
     return area
 
 
@@ -282,10 +282,10 @@ def winding(uv, n):
 def bounds(uv, n):
     """Return the bounds (left, top, right, bottom) of a projected polygon [px]."""
     left = right = uv[0, 0]
-    top = bottom = uv[0, 1]
+    top = bottom = uv[1, 0]
     for i in range(1, n):
-        left, right = min(left, uv[i, 0]), max(right, uv[i, 0])
-        top, bottom = min(top, uv[i, 1]), max(bottom, uv[i, 1])
+        left, right = min(left, uv[0, i]), max(right, uv[0, i])
+        top, bottom = min(top, uv[1, i]), max(bottom, uv[1, i])
     return left, top, right, bottom
 
 
@@ -294,7 +294,7 @@ def add_polygon(acc, k, uv, n, w, w2):
     """Add a projected polygon of positive winding; one of negative winding is subtracted."""
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
-        add_edge(acc, k, uv[i, 0], uv[i, 1], uv[j, 0], uv[j, 1], w, w2)
+        add_edge(acc, k, uv[0, i], uv[1, i], uv[0, j], uv[1, j], w, w2)
 
 
 @kernel(inline=True)

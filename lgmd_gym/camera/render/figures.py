@@ -36,7 +36,6 @@ from lgmd_gym.camera.render.solids import (
     compose,
     grey_of,
     outside,
-    place_corners,
     place_object,
     to_axes,
 )
@@ -204,7 +203,10 @@ def _to_camera(lens, obj, layer, used):
     to_axes(lens, obj.cos, obj.sin, 0.0, axes, np.int64(1))
     to_axes(lens, -obj.sin, obj.cos, 0.0, axes, np.int64(2))
     to_axes(lens, 0.0, 0.0, 1.0, axes, np.int64(3))
-    place_corners(joints, used, axes, joints)
+    for j in range(used):
+        x, y, z = _row(joints, j)
+        for k in range(3):
+            joints[j, k] = axes[0, k] + x * axes[1, k] + y * axes[2, k] + z * axes[3, k]
 
 
 @kernel(inline=True)
@@ -288,11 +290,11 @@ def _add_limb(layer, view, obj, part, thick, weight, air):
     cap = thick * part.cap
     for k in range(3):
         side, tip = first * across[k], a[k] - cap * along[k]
-        corners[0, k], corners[1, k] = a[k] + side, tip + _ROUND * side
-        corners[2, k], corners[3, k] = tip - _ROUND * side, a[k] - side
+        corners[k, 0], corners[k, 1] = a[k] + side, tip + _ROUND * side
+        corners[k, 2], corners[k, 3] = tip - _ROUND * side, a[k] - side
         side, tip = last * across[k], b[k] + cap * along[k]
-        corners[4, k], corners[5, k] = b[k] - side, tip - _ROUND * side
-        corners[6, k], corners[7, k] = tip + _ROUND * side, b[k] + side
+        corners[k, 4], corners[k, 5] = b[k] - side, tip - _ROUND * side
+        corners[k, 6], corners[k, 7] = tip + _ROUND * side, b[k] + side
     m = clip_and_project(view.lens, corners, 8, layer.uv)
     if not _in_frame(layer, m):
         return 0
@@ -308,7 +310,7 @@ def _place_ring(centre, level, radius, wider, layer):
         c, s = _CIRCLE[i, 0], _CIRCLE[i, 1]
         for k in range(3):
             g = radius * layer.axes[1, k] + wider * level[k]
-            layer.corners[i, k] = centre[k] + c * g + s * radius * layer.axes[3, k]
+            layer.corners[k, i] = centre[k] + c * g + s * radius * layer.axes[3, k]
 
 
 @kernel

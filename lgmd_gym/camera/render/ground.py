@@ -56,9 +56,9 @@ def add_ground_quad(layer, k, lens, quad, weight):
         dx, dy = quad[2 * i] - lens.x, quad[2 * i + 1] - lens.y
         ahead = dx * lens.cos_yaw + dy * lens.sin_yaw
         nearest, farthest = min(nearest, ahead), max(farthest, ahead)
-        corners[i, 0] = ahead * lens.cos_pitch - lens.z * lens.sin_pitch
-        corners[i, 1] = dy * lens.cos_yaw - dx * lens.sin_yaw
-        corners[i, 2] = ahead * lens.sin_pitch + lens.z * lens.cos_pitch
+        corners[0, i] = ahead * lens.cos_pitch - lens.z * lens.sin_pitch
+        corners[1, i] = dy * lens.cos_yaw - dx * lens.sin_yaw
+        corners[2, i] = ahead * lens.sin_pitch + lens.z * lens.cos_pitch
     if farthest > layer.frustum.near and nearest < layer.frustum.far:
         add_quad(layer, k, lens, weight)
 
@@ -69,9 +69,9 @@ def add_quad(layer, k, lens, weight):
     corners, uv = layer.corners, layer.uv
     c, s = lens.cos_roll, lens.sin_roll
     for i in range(4):
-        right, down = corners[i, 1], corners[i, 2]
-        corners[i, 1], corners[i, 2] = right * c + down * s, down * c - right * s
-    if max(max(corners[0, 0], corners[1, 0]), max(corners[2, 0], corners[3, 0])) < NEAR:
+        right, down = corners[1, i], corners[2, i]
+        corners[1, i], corners[2, i] = right * c + down * s, down * c - right * s
+    if max(max(corners[0, 0], corners[0, 1]), max(corners[0, 2], corners[0, 3])) < NEAR:
         return
     n = clip_and_project(lens, corners, 4, uv)
     if n >= 3:
@@ -223,9 +223,9 @@ def _add_stroke(layer, lens, line, a, b, weight):
         t = a if i < 2 else b
         side = -1.0 if i == 0 or i == 3 else 1.0
         forward = line.ahead + t * line.d_ahead + side * ha
-        corners[i, 0] = forward * cos - lens.z * sin
-        corners[i, 1] = line.across + t * line.d_across + side * hc
-        corners[i, 2] = forward * sin + lens.z * cos
+        corners[0, i] = forward * cos - lens.z * sin
+        corners[1, i] = line.across + t * line.d_across + side * hc
+        corners[2, i] = forward * sin + lens.z * cos
     add_quad(layer, PAINT, lens, weight)
 
 

@@ -204,9 +204,9 @@ def _add_shadow_of(layer, lens, obj, away, weight):
 def _write_corner(layer, lens, i, x, y):
     """Write corner i, relative to the lens on the ground [m], in camera axes."""
     ahead = x * lens.cos_yaw + y * lens.sin_yaw
-    layer.corners[i, 0] = ahead * lens.cos_pitch - lens.z * lens.sin_pitch
-    layer.corners[i, 1] = y * lens.cos_yaw - x * lens.sin_yaw
-    layer.corners[i, 2] = ahead * lens.sin_pitch + lens.z * lens.cos_pitch
+    layer.corners[0, i] = ahead * lens.cos_pitch - lens.z * lens.sin_pitch
+    layer.corners[1, i] = y * lens.cos_yaw - x * lens.sin_yaw
+    layer.corners[2, i] = ahead * lens.sin_pitch + lens.z * lens.cos_pitch
 
 
 @kernel
@@ -259,7 +259,7 @@ def _add_outline(layer, lens, n, weight):
     """Add the polygon of the first n corners, of either winding."""
     deepest = layer.corners[0, 0]
     for k in range(1, n):
-        deepest = max(deepest, layer.corners[k, 0])
+        deepest = max(deepest, layer.corners[0, k])
     if deepest < NEAR:
         return
     m = clip_and_project(lens, layer.corners, n, layer.uv)

@@ -9,11 +9,19 @@ import numba as nb
 import numpy as np
 
 from lgmd_gym.camera.objects import is_picture
-from lgmd_gym.camera.render.coverage import add_polygon, bounds, clip_and_project, sum_differences
+from lgmd_gym.camera.render.coverage import NEAR, add_polygon, bounds, clip_and_project, sum_differences
 from lgmd_gym.camera.render.light import row_slope, veil_at
 from lgmd_gym.camera.render.models.builder import BODY, LAMP, TAIL, UNDER
 from lgmd_gym.camera.render.seen import distance
 from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.doubles import (
+    greatest_double,
+    least_double,
+    load_doubles,
+    madd_doubles,
+    splat_double,
+    store_doubles,
+)
 from lgmd_gym.kernels.simd import (
     LANES,
     any_above,
@@ -65,13 +73,48 @@ def place_object(lens, look, obj, axes):
     to_axes(lens, look.sun_x, look.sun_y, look.sun_z, axes, np.int64(4))
 
 
+@kernel(inline=True)
+def _along(axes, k, a, b, c):
+    """Return coordinate k in camera axes of eight points, given as fractions of an object's axes."""
+    sums = madd_doubles(a, splat_double(axes[1, k]), splat_double(axes[0, k]))
+    return madd_doubles(c, splat_double(axes[3, k]), madd_doubles(b, splat_double(axes[2, k]), sums))
+
+
+@kernel(inline=True)
+def _place_polygon(lens, models, p, layer):
+    """Project polygon p of an object to `layer.uv`.
+
+    Returns:
+        Number of projected corners, below 3 for a polygon behind the near plane, and their bounds (left, top,
+        right, bottom) [px].
+    """
+    corners, n, uv = models.corners[p], models.corners_used[p], layer.uv
+    size = corners.shape[1]
+    a, b, c = load_doubles(corners, 0), load_doubles(corners, size), load_doubles(corners, 2 * size)
+    depth = _along(layer.axes, 0, a, b, c)
+    right, down = _along(layer.axes, 1, a, b, c), _along(layer.axes, 2, a, b, c)
+    if least_double(depth) < NEAR:
+        stride = layer.corners.shape[1]
+        store_doubles(layer.corners, 0, depth)
+        store_doubles(layer.corners, stride, right)
+        store_doubles(layer.corners, 2 * stride, down)
+        n = clip_and_project(lens, layer.corners, n, uv)
+        return n, bounds(uv, max(n, 1))
+    scale = splat_double(lens.focal) / depth
+    u = madd_doubles(scale, right, splat_double(lens.centre_u))
+    v = madd_doubles(scale, down, splat_double(lens.centre_v))
+    store_doubles(uv, 0, u)
+    store_doubles(uv, uv.shape[1], v)
+    return n, (least_double(u), least_double(v), greatest_double(u), greatest_double(v))
+
+
 @kernel
-def place_corners(fractions, n, axes, corners):
-    """Place the first n corners of a polygon, given as fractions of an object's axes, in camera axes."""
-    for i in range(n):
-        a, b, c = fractions[i, 0], fractions[i, 1], fractions[i, 2]
+def _place_face(fractions, axes, corners):
+    """Place the first three corners of a face in camera axes."""
+    for i in range(3):
+        a, b, c = fractions[0, i], fractions[1, i], fractions[2, i]
         for k in range(3):
-            corners[i, k] = axes[0, k] + a * axes[1, k] + b * axes[2, k] + c * axes[3, k]
+            corners[k, i] = axes[0, k] + a * axes[1, k] + b * axes[2, k] + c * axes[3, k]
 
 
 @kernel
@@ -96,11 +139,11 @@ def outside(lens, axes):
 @kernel
 def _face_light(corners, axes, look):
     """Return the light on a face, or a negative number if its back faces the lens."""
-    ax, ay, az = corners[1, 0] - corners[0, 0], corners[1, 1] - corners[0, 1], corners[1, 2] - corners[0, 2]
-    bx, by, bz = corners[2, 0] - corners[1, 0], corners[2, 1] - corners[1, 1], corners[2, 2] - corners[1, 2]
+    ax, ay, az = corners[0, 1] - corners[0, 0], corners[1, 1] - corners[1, 0], corners[2, 1] - corners[2, 0]
+    bx, by, bz = corners[0, 2] - corners[0, 1], corners[1, 2] - corners[1, 1], corners[2, 2] - corners[2, 1]
     # Camera axes are right-handed (depth, right, down): this normal points outwards.
     nx, ny, nz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    if nx * corners[0, 0] + ny * corners[0, 1] + nz * corners[0, 2] >= 0.0:
+    if nx * corners[0, 0] + ny * corners[1, 0] + nz * corners[2, 0] >= 0.0:
         return -1.0
     norm = math.sqrt(nx * nx + ny * ny + nz * nz)
     return look.ambient + look.direct * max(0.0, (nx * axes[4, 0] + ny * axes[4, 1] + nz * axes[4, 2]) / norm)
@@ -172,7 +215,7 @@ def _find_faces(layer, look, models, solids, seen, index):
             if parent >= 0:
                 light = greys[parent, 1]
             else:
-                place_corners(models.corners[p], np.int64(3), layer.axes, corners)
+                _place_face(models.corners[p], layer.axes, corners)
                 light = _face_light(corners, layer.axes, look)
             greys[p, 1] = light
             if light > 0.0:
@@ -187,12 +230,12 @@ def _add_solid(layer, lens, look, obj, models, part, size, air, seen):
 
     Returns the bounds (u0, v0, u1, v1) of all of them [px]; u1 < u0 if there is none.
     """
-    corners, uv, greys = layer.corners, layer.uv, layer.greys
+    uv, greys = layer.uv, layer.greys
     height, width = layer.coverage.shape[1], layer.coverage.shape[2] - 2
     u0, v0, u1, v1 = 1e9, 1e9, -1e9, -1e9
     for at in range(part[0], part[1]):
         p = seen.polygons[at]
-        n, parent = models.corners_used[p], models.parent[p]
+        parent = models.parent[p]
         greys[p, 1] = 0.0
         weight = air.opacity
         if parent >= 0:
@@ -203,11 +246,10 @@ def _add_solid(layer, lens, look, obj, models, part, size, air, seen):
         light = seen.lights[at] * air.light
         if light <= 0.0:
             continue
-        place_corners(models.corners[p], n, layer.axes, corners)
-        m = clip_and_project(lens, corners, n, uv)
+        m, box = _place_polygon(lens, models, p, layer)
         if m < 3:
             continue
-        left, top, right, bottom = bounds(uv, m)
+        left, top, right, bottom = box
         # The edges of a polygon left of the frame would cancel.
         if right <= 0.0 or bottom <= 0.0 or left >= width or top >= height:
             continue

@@ -37,7 +37,8 @@ _MAX_CORNERS = 8
 class Models(NamedTuple):
     """Polygons of all models; see `ModelBuilder` for the terms."""
 
-    corners: np.ndarray  # float64, shape (polygons, 8, 3), anticlockwise from outside
+    # anticlockwise from outside, and the first one again for unused places, float64, shape (polygons, 3, 8)
+    corners: np.ndarray
     corners_used: np.ndarray  # number of corners, int64, shape (polygons,)
     parent: np.ndarray  # index of a detail's face, -1 for a face, int64, shape (polygons,)
     role: np.ndarray  # BODY, FIXED, TAIL or LAMP, int64, shape (polygons,)
@@ -86,9 +87,9 @@ def all_models(linear: bool) -> Models:
         add(b)
     for lamps in ((0.0, 0.0), (0.0, 0.0), (-1.0, 0.6)):  # a motorcycle has one headlight
         b.model(lamps=lamps)
-    corners = np.zeros((len(b.corners), _MAX_CORNERS, 3))
+    corners = np.zeros((len(b.corners), 3, _MAX_CORNERS))
     for index, points in enumerate(b.corners):
-        corners[index, : len(points)] = points
+        corners[index] = np.transpose([*points, *[points[0]] * (_MAX_CORNERS - len(points))])
     return Models(
         corners,
         corners_used=np.array([len(points) for points in b.corners], dtype=np.int64),

@@ -1,0 +1,92 @@
+# pyright: standard
+# Not strict: numba infers the types of the arguments of kernels.
+"""LLVM vectors of eight float64 lanes for numba kernels, for coordinates; see `simd` for the idea."""
+
+import operator
+
+from llvmlite import ir
+from numba import types
+from numba.extending import models, register_model
+
+from lgmd_gym.kernels.simd import call, elementwise, intrinsic, overload_operator, pointer_to
+
+LANES = 8
+_DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
+_FIRST = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
+
+
+class Float64x8(types.Type):
+    """Numba type of eight float64 lanes."""
+
+    def __init__(self) -> None:
+        super().__init__(name="Float64x8")
+
+
+doubles = Float64x8()
+
+
+@register_model(Float64x8)
+class _Doubles(models.PrimitiveModel):
+    def __init__(self, dmm, fe_type) -> None:
+        super().__init__(dmm, fe_type, _DOUBLES)
+
+
+@intrinsic
+def load_doubles(typingctx, array, index):
+    """Load eight elements of a contiguous float64 array, counted without its dimensions."""
+
+    def codegen(context, builder, signature, args):
+        lanes = builder.load(pointer_to(context, builder, signature.args[0], args[0], args[1], _DOUBLES))
+        lanes.align = 8
+        return lanes
+
+    return doubles(array, types.intp), codegen
+
+
+@intrinsic
+def store_doubles(typingctx, array, index, value):
+    """Store the lanes to eight elements of a contiguous float64 array."""
+
+    def codegen(context, builder, signature, args):
+        pointer = pointer_to(context, builder, signature.args[0], args[0], args[1], _DOUBLES)
+        builder.store(args[2], pointer).align = 8
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp, doubles), codegen
+
+
+@intrinsic
+def splat_double(typingctx, value):
+    """Return a vector with the same float64 in every lane."""
+
+    def codegen(context, builder, signature, args):
+        empty = ir.Constant(_DOUBLES, ir.Undefined)
+        first = builder.insert_element(empty, args[0], ir.Constant(ir.IntType(32), 0))
+        return builder.shuffle_vector(first, empty, _FIRST)
+
+    return doubles(types.float64), codegen
+
+
+# x * y + z, with a single rounding if the machine supports it.
+madd_doubles = elementwise(
+    3, lambda b, x, y, z: call(b, f"llvm.fmuladd.v{LANES}f64", x, y, z, result=_DOUBLES), doubles
+)
+
+
+def _reduction(name):
+    """Return an intrinsic that reduces all lanes, of which none may be NaN, to one float64."""
+
+    @intrinsic
+    def reduce(typingctx, a):
+        def codegen(context, builder, signature, args):
+            return call(builder, f"llvm.vector.reduce.{name}.v{LANES}f64", *args, result=ir.DoubleType())
+
+        return types.float64(doubles), codegen
+
+    return reduce
+
+
+least_double, greatest_double = _reduction("fmin"), _reduction("fmax")
+
+overload_operator(operator.mul, elementwise(2, lambda b, x, y: b.fmul(x, y), doubles), doubles)
+overload_operator(operator.truediv, elementwise(2, lambda b, x, y: b.fdiv(x, y), doubles), doubles)
