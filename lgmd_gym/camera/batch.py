@@ -51,6 +51,7 @@ class CameraBatch:
     Attributes:
         lenses: `LENS` records of the last frames at the end and at the start of the exposure, shape
             (num_envs, members, 2).
+        bundle: The arrays that `draw_cameras` reads.
     """
 
     def __init__(
@@ -74,7 +75,7 @@ class CameraBatch:
             exposures=np.full((*size, STATE_SIZE), np.nan),
         )
         # Places of the tables, mount and lenses of each camera, and the fields of its view.
-        self._bundle = Bundle(self._places, self._mounts, self.lenses, tuple(self._views))
+        self.bundle = Bundle(self._places, self._mounts, self.lenses, tuple(self._views))
         self.set_scene(slice(None), Scene())
 
     def set_scene(self, index: int | slice, scene: Scene, max_deceleration: float = USUAL_BRAKE) -> None:
@@ -137,7 +138,7 @@ class CameraBatch:
 
         Threads may draw disjoint ranges at once, each with a workspace of its own.
         """
-        inputs = workspace.join(self._bundle, scene_table, roads)
+        inputs = workspace.join(self.bundle, scene_table, roads)
         draw_cameras(first, last, frames, selected, inputs.native)
 
     def __setstate__(self, state: dict[str, object]) -> None:

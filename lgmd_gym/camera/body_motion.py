@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.hashing import START, add_hash, finish_hash
 
 MEAN_SPEED = 16.73  # of the recording [m/s]
 _MAX_SPEED = 60.0  # the amplitude does not grow beyond this [m/s]
@@ -74,12 +75,19 @@ def road_gain(factor, speed):
     return factor * math.sqrt(min(abs(speed), _MAX_SPEED) / MEAN_SPEED)
 
 
+@kernel(exact=True)
+def _phase(seed, axis, k):
+    """Return the random phase of a sinusoid, in [0, 1)."""
+    number = finish_hash(add_hash(add_hash(add_hash(START, seed), axis), k), 3)
+    return (number & ((1 << _BITS) - 1)) / (1 << _BITS)
+
+
 @kernel(exact=True, arrays=True)
 def body_motion(seed, axis, time_s):
     """Return the motion of one axis at `MEAN_SPEED`, in the unit of `BAND_RMS`."""
     total = 0.0
     for k in range(HERTZ.shape[0]):
-        phase = (hash((seed, axis, k)) & ((1 << _BITS) - 1)) / (1 << _BITS)
+        phase = _phase(seed, axis, k)
         total += _AMPLITUDES[axis, k] * math.sin(2.0 * math.pi * (HERTZ[k] * time_s + phase))
     return total
 
@@ -94,9 +102,9 @@ def residual_motion(seed, axis, time_s):
     """
     total = 0.0
     for k in range(HERTZ.shape[0]):
-        phase = (hash((seed, axis, k)) & ((1 << _BITS) - 1)) / (1 << _BITS)
+        phase = _phase(seed, axis, k)
         total += _LEFT[axis, k] * math.sin(2.0 * math.pi * (HERTZ[k] * time_s + phase) + _LEAD[k])
     for k in range(_DRIFT_HERTZ.shape[0]):
-        phase = (hash((seed, _DRIFT_AXIS + axis, k)) & ((1 << _BITS) - 1)) / (1 << _BITS)
+        phase = _phase(seed, _DRIFT_AXIS + axis, k)
         total += _DRIFT_DEG * math.sin(2.0 * math.pi * (_DRIFT_HERTZ[k] * time_s + phase))
     return total

@@ -26,6 +26,7 @@ from lgmd_gym.camera.effects import NOISE_LOG2
 from lgmd_gym.camera.scene import ROADS, Scene
 from lgmd_gym.camera.worlds import draw_world
 from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.hashing import START, add_hash, finish_hash
 
 FIXED, PATH, STOPPING = 0, 1, 2  # values of `MOUNT.gaze`
 GAZE_NUMBERS = {"fixed": FIXED, "path": PATH, "stopping": STOPPING}
@@ -314,4 +315,7 @@ def side_tangent(lens):
 @kernel(exact=True, arrays=True)
 def noise_start(mount, scene, lens):
     """Return the index of a frame's first number in the noise table, a function of seed and road state."""
-    return hash((mount.seed, scene.steps, lens.x, lens.y, lens.yaw)) & ((1 << NOISE_LOG2) - 1)
+    state = add_hash(add_hash(START, mount.seed), scene.steps)
+    for place in (lens.x, lens.y, lens.yaw):
+        state = add_hash(state, hash(place))
+    return finish_hash(state, 5) & ((1 << NOISE_LOG2) - 1)

@@ -1,7 +1,8 @@
 """Compilation of the kernels at the first use, in two processes at once.
 
 Numba compiles one kernel after the other, each at its first call. The kernel that draws cameras takes two
-thirds of the time, so that a second process compiles motion and neuron meanwhile, for numba's cache.
+thirds of the time. A second process compiles motion and the last stages of drawing meanwhile, for numba's
+cache, where the first process finds them when it comes to them.
 """
 
 import os
@@ -14,16 +15,18 @@ from highway_env.road.road import RoadNetwork
 from numba.core import config
 
 from lgmd_gym.camera import Camera
-from lgmd_gym.camera.render.raster import draw_cameras
+from lgmd_gym.camera.pose import USUAL_BRAKE
+from lgmd_gym.camera.render.raster import Workspace, draw_cameras, draw_last_stages
+from lgmd_gym.camera.scene import Scene
 from lgmd_gym.envs.decisions import advance
 from lgmd_gym.envs.registration import env_id
 from lgmd_gym.kernels.compilation import VARIABLE, expected_functions
-from lgmd_gym.kernels.kernel import is_cached
+from lgmd_gym.kernels.kernel import Kernel, is_cached
 from lgmd_gym.neuron import LGMD
 from lgmd_gym.processes.pool import signals_blocked, watch_parent
 from lgmd_gym.sensing.drawing import Drawing
 
-FUNCTIONS = 265  # compiled by the first process, those of numba included
+FUNCTIONS = 165  # compiled by the first process, those of numba included
 _HELPER = f"from {__name__} import _compile_others; _compile_others()"
 
 
@@ -40,6 +43,8 @@ def compile_kernels() -> None:
             with signals_blocked():
                 helper = _start_helper()
             _draw_camera()
+            _plant_roadside()
+            _step_neuron()
             if helper is not None:
                 helper.wait()
         finally:
@@ -66,18 +71,43 @@ def _start_helper() -> "subprocess.Popen[bytes] | None":
 
 
 def _compile_others() -> None:  # pyright: ignore[reportUnusedFunction]
-    """Compile the kernels of motion and of the LGMD; end with the first process."""
+    """Compile the last stages of drawing and the kernels of motion; end with the first process."""
     watch_parent(os.getppid())
+    # First, so that they are in the cache when the first process comes to them.
+    drawing = _make_drawing()
+    group = drawing.groups[0]
+    inputs = Workspace(group.batch.shape).join(
+        group.batch.bundle, drawing.scene_table.bundle, drawing.roads.bundle
+    )
+    if isinstance(draw_last_stages, Kernel):
+        draw_last_stages.compile_inner(group.frames, inputs.native)
     _step_environment(camera=None)
-    camera = Camera()
-    LGMD(camera.shape).step(np.zeros(camera.shape, np.uint8))
+
+
+def _make_drawing() -> Drawing:
+    """Return a camera on a road."""
+    drawing = Drawing([Camera()], [[0]], 1)
+    drawing.set_road(0, RoadNetwork.straight_road_network(2))
+    return drawing
 
 
 def _draw_camera() -> None:
     """Draw one frame."""
+    _make_drawing().draw(0, 0, 1, np.ones((1, 1), np.bool_))
+
+
+def _step_neuron() -> None:
+    """Step an LGMD once."""
+    shape = Camera().shape
+    LGMD(shape).step(np.zeros(shape, np.uint8))
+
+
+def _plant_roadside() -> None:
+    """Compile what draws the roadside of a world at the start of an episode."""
+    scene = Scene(world=0)
     drawing = Drawing([Camera()], [[0]], 1)
+    drawing.set_scene(0, scene, USUAL_BRAKE)
     drawing.set_road(0, RoadNetwork.straight_road_network(2))
-    drawing.draw(0, 0, 1, np.ones((1, 1), np.bool_))
 
 
 def _step_environment(**arguments: None) -> None:

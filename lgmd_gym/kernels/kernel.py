@@ -123,6 +123,14 @@ class Kernel(CPUDispatcher):
             finally:
                 Kernel._depth -= 1
 
+    def compile_inner(self, *args: Any) -> None:
+        """Compile or load the function for compiled callers with arguments such as these."""
+        Kernel._depth += 1
+        try:
+            self.compile(tuple(map(self.typeof_pyval, args)))
+        finally:
+            Kernel._depth -= 1
+
     def add_overload(self, cres: CompileResult) -> None:
         """Store a compiled or loaded overload."""
         if _is_inner():

@@ -69,6 +69,7 @@ class Drawing:
         groups: The distinct groups.
         group_of: Index of the distinct group for each group of the arguments.
         scene_table: State of the environments, see `SceneTable`.
+        roads: Their roads.
         known_decelerations: The car's estimate of its full braking in each environment, float64, shape
             (num_envs, 1) [m/s²]; None unless a camera uses it.
     """
@@ -85,7 +86,7 @@ class Drawing:
             }
             for _ in range(num_envs)
         ]
-        self.scene_table, self._roads = SceneTable(num_envs), RoadPool(num_envs)
+        self.scene_table, self.roads = SceneTable(num_envs), RoadPool(num_envs)
         self._scenes = [(Scene(), USUAL_BRAKE)] * num_envs
         self._sectors: dict[int, Sector | None] = {}  # by environment
         self.groups: list[FrameGroup] = []
@@ -121,7 +122,7 @@ class Drawing:
 
     def set_road(self, index: int, road: "Road | RoadNetwork", geometry: RoadGeometry | None = None) -> None:
         """Set the road of an environment; see `SensorArray.set_road`."""
-        self._roads.assign(index, road, road_key(self._scenes[index][0]), geometry)
+        self.roads.assign(index, road, road_key(self._scenes[index][0]), geometry)
 
     def set_scene(self, index: int, scene: Scene, max_deceleration: float) -> None:
         """Set the scene of an environment; see `SensorArray.set_scene`."""
@@ -136,7 +137,7 @@ class Drawing:
 
     def draw(self, group: int, first: int, last: int, selected: np.ndarray) -> None:
         """Draw selected cameras of a distinct group; see `FrameGroup.draw`."""
-        self.groups[group].draw(first, last, self.scene_table.bundle, self._roads.bundle, selected)
+        self.groups[group].draw(first, last, self.scene_table.bundle, self.roads.bundle, selected)
 
     def frame_of(self, camera: int, index: int) -> np.ndarray:
         """Return a view of the last frame of one camera of an environment, uint8, (height, width)."""

@@ -98,6 +98,6 @@ def test_details_have_the_corners_of_convex_polygons_inside_their_face(name):
     models = all_models(linear=False)
     for solid in range(*models.models[BODY_MODELS[name].model]):
         for polygon in range(*models.solids[solid]):
-            assert np.abs(models.corners[polygon, :, :2]).max() <= 0.5 + 1e-9
-            assert models.corners[polygon, :, 2].min() >= 0.0
-            assert models.corners[polygon, :, 2].max() <= 1.0 + 1e-9
+            assert np.abs(models.corners[polygon, :2]).max() <= 0.5 + 1e-9
+            assert models.corners[polygon, 2].min() >= 0.0
+            assert models.corners[polygon, 2].max() <= 1.0 + 1e-9

@@ -14,7 +14,7 @@ PLAIN = {"texture": 0.0, "roadside": 0.0, "vehicles": "box"}
 
 def coverage(corners, shape=(24, 32)):
     acc = np.zeros((2, shape[0], shape[1] + 2), np.float32)
-    add_polygon(acc, 0, np.asarray(corners, float), len(corners), 1.0, 0.0)
+    add_polygon(acc, 0, np.array(np.transpose(corners), float), len(corners), 1.0, 0.0)
     return np.cumsum(acc[0, :, : shape[1]], axis=1)
 
 

@@ -97,7 +97,7 @@ def _solid(scene, item, solid, rays):
 
 def _corners(scene, item, models, polygon):
     """Return the corners of a polygon as (depth, right, down), shape (corners, 3) [m]."""
-    a, b, c = models.corners[polygon, : models.corners_used[polygon]].T
+    a, b, c = models.corners[polygon, :, : models.corners_used[polygon]]
     lens, cos, sin = scene.lens, item.cos, item.sin
     dx, dy = item.x - lens.x, item.y - lens.y
     if is_picture(item.model):

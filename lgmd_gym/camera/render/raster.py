@@ -154,6 +154,13 @@ def draw_light(view, road, tables, models, seen, member, vehicles, buffers):
     if view.look.cast > 0.0:
         add_cast_shadows(ground, view, seen, road.roadside)
     mark(clock, CAST_SHADOWS)
+    draw_near(view, tables, models, seen, member, vehicles, horizon, buffers)
+
+
+@kernel
+def draw_near(view, tables, models, seen, member, vehicles, horizon, buffers):
+    """Draw the ground layer, the solid objects and the glare of the sun; see `draw_frame`."""
+    image, clock = buffers.image, buffers.clock
     draw_ground(image, view, buffers.ground, tables, horizon)
     mark(clock, GROUND)
     solids = SolidLayer(
@@ -164,9 +171,9 @@ def draw_light(view, road, tables, models, seen, member, vehicles, buffers):
         greys=buffers.greys,
         joints=buffers.joints,
     )
-    draw_solids(image, view, models, seen, n, member, vehicles, solids, clock)
+    draw_solids(image, view, models, seen, seen.counts[1], member, vehicles, solids, clock)
     if view.look.glare > 0.0:
-        add_sun_glare(image, lens, view.look)
+        add_sun_glare(image, view.lens, view.look)
 
 
 @kernel
@@ -214,6 +221,13 @@ def draw_frame(frame, view, opening, road, tables, models, seen, member, vehicle
             move_objects(seen.objects, vehicles, ago * look.shutter_s)
             add_weighted(total, image, nb.float32(1.0 / steps))
         overwrite(image, total)
+    expose_frame(frame, view, tables, buffers)
+
+
+@kernel
+def expose_frame(frame, view, tables, buffers):
+    """Turn the light in `buffers.image` into a frame; see `draw_frame`."""
+    image, look = buffers.image, view.look
     gain = adapt_exposure(view.exposure, image, look) if look.auto_exposure_s > 0.0 else 1.0
     tone = fixed_tone(look)
     if look.contrast_s > 0.0:
@@ -301,6 +315,31 @@ def _see_from(lenses, mount, objects, count, roadside, look, lamps, seen):
 
 
 @kernel(arrays=True)
+def draw_last_stages(frames, inputs):
+    """Draw what is near and expose the frame of the first camera.
+
+    These stages are a third of `draw_cameras`. A second process compiles them for numba's cache; this function
+    has no other purpose. The arguments are as there.
+    """
+    batch, _, _, variants, space = inputs.arrays
+    places, _, lenses, views = batch
+    seen, _, buffers = space
+    views, seen, buffers, models = Views(*views), Seen(*seen), Buffers(*buffers), Models(*variants[0])
+    view = View(
+        lens=lenses[0, 0, 0],
+        look=views.looks[0, 0],
+        beam=views.beams[0, 0],
+        sky=views.skies[0, 0],
+        sky_aim=views.sky_aims[0, 0],
+        noise_start=views.noise_starts[0, 0],
+        exposure=views.exposures[0, 0],
+    )
+    tables = tables_at(places[0, 0])
+    draw_near(view, tables, models, seen, 0, 0, horizon_of(view.lens), buffers)
+    expose_frame(frames[0, 0], view, tables, buffers)
+
+
+@kernel(arrays=True)
 def draw_cameras(first, last, frames, selected, inputs):
     """Pose and draw the selected cameras of the environments first..last-1.
 
@@ -368,7 +407,7 @@ def draw_cameras(first, last, frames, selected, inputs):
                 )
                 # Of objects that hide each other in turn, each lens sees others.
                 if not ordered and end - start > 1:
-                    order_objects(lenses[env, k, 0], lenses[env, k, 0].focal, 1 << (k - start), seen)
+                    order_objects(seen.frusta[k - start], view.lens.focal, 1 << (k - start), seen)
                 tables, opening = tables_at(places[env, k]), lenses[env, k, 1]
                 draw_frame(
                     frames[env, k], view, opening, road, tables, models, seen, k - start, vehicles, buffers
