@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from lgmd_gym.agents.base import FPS, Observations
+from lgmd_gym.agents.policies.kernels import PART, update_fields
 from lgmd_gym.agents.sides import NUM_ALL_ROUND, NUM_COLUMNS, NUM_FORWARD_FIELDS, NUM_SIDE_FIELDS
 from lgmd_gym.agents.zones import NUM_FIELDS
 from lgmd_gym.aliases import Values
@@ -277,7 +278,6 @@ class FeatureHistory:
 
     def _allocate(self, observations: Observations) -> None:
         """Make the arrays of the state for the shapes of observations."""
-        self._allocated = True
         num_envs, length, size = len(self._updated), self.features.history, 0
         offsets: list[float] = []
         scales: list[float] = []
@@ -295,6 +295,7 @@ class FeatureHistory:
             shape = shrink_frames(frames[:1], self.features.shrink).shape[1:]
             self._frames = np.zeros((num_envs, *frames.shape[1:]), np.uint8)
             self._frame_history = np.zeros((num_envs, length, *shape), np.uint8)
+        self._allocated = True
 
     def _scale(self, chosen: Chosen) -> np.ndarray:
         """Return the present scaled features of some environments, float32, shape (M, values)."""
@@ -329,8 +330,6 @@ class _Fields:
         self.parts: dict[str, slice] = {}
         if not names:
             return
-        from lgmd_gym.agents.policies.kernels import PART, update_fields  # imports numba, half a second
-
         parts: list[tuple[int, int, float, bool]] = []
         size = 0
         for name in names:
@@ -338,7 +337,7 @@ class _Fields:
             parts.append((size, last - first, factor, source in POTENTIALS))
             self.parts[name] = slice(NUM_LEVELS * size, NUM_LEVELS * (size + last - first))
             size += last - first
-        self._definitions, self._kernel = np.array(parts, PART), update_fields
+        self._definitions = np.array(parts, PART)
         self._signals, self._levels = np.zeros((2, num_envs, size))
         self._frames, self._gains = np.zeros(num_envs), np.ascontiguousarray(GAINS[:, 0])
         self.features = np.zeros((num_envs, NUM_LEVELS * size))
@@ -353,7 +352,7 @@ class _Fields:
             check_zone_shape(name, signal.shape[1:])
             place = part.start // NUM_LEVELS
             self._signals[chosen, place : place + last - first] = signal[chosen, first:last]
-        self._kernel(
+        update_fields(
             self._signals, rows, started, self._definitions, self._gains, NORM,
             self._levels, self._frames, self.features,
         )  # fmt: skip

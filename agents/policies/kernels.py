@@ -48,11 +48,11 @@ def update_fields(signals, rows, started, parts, gains, norm, levels, frames, fe
         frames[n] = frames[n] + 1.0 if old else 1.0
         for index in range(len(parts)):
             part = parts[index]
-            first, count = part.first, part.count
+            first, count = part["first"], part["count"]
             place = first * (1 + len(gains))
             for field in range(count):
-                signal = _level(signals[n, first + field], part.factor, part.is_potential) / norm
-                signals[n, first + field] = signal
+                signal = _level(signals[n, first + field], part["factor"], part["is_potential"])
+                signals[n, first + field] = signal / norm
             for field in range(count):
                 level = signals[n, first + field]
                 last = levels[n, first + field] if old else level

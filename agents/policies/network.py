@@ -16,6 +16,7 @@ import numpy as np
 from gymnasium import spaces
 
 from lgmd_gym.agents.policies.features import FRAME
+from lgmd_gym.agents.policies.kernels import affine
 from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import check_items, check_keys, check_known, check_type, check_whole
 from lgmd_gym.fields import Record, record, text, value
@@ -219,8 +220,6 @@ class DenseNetwork:
 
             with torch.inference_mode():
                 return self._layers(torch.from_numpy(values)).numpy()
-        from lgmd_gym.agents.policies.kernels import affine  # imports numba, half a second
-
         for step in self._steps:
             if isinstance(step, tuple):
                 out = np.empty((len(values), len(step[1])), np.float32)

@@ -1,5 +1,7 @@
 """Inputs of policies: scaling, history, and the fields of `stopping-zone`."""
 
+import pickle
+
 import numpy as np
 import pytest
 from support.agents import to_potential, zone_levels
@@ -127,6 +129,16 @@ def test_averages_do_not_depend_on_the_time_since_the_start():
     averages = zone_features(history, *[np.zeros(NUM_FIELDS)] * 2)[1:, zone] / (np.log1p(8.0) / 3.4)
     assert averages[2] == pytest.approx(30 / 32, abs=1e-6)
     assert averages[0] == pytest.approx((1.0 - 1.0 / 4.0) ** 2, abs=1e-6)
+
+
+def test_a_pickle_contains_no_kernel():
+    """A kernel of a pickle has no cache on disk: each process would compile it."""
+    history, levels = zone_history(), zone_levels(upright=4.0)
+    zone_features(history, levels)
+    data = pickle.dumps(history)
+    assert b"numba" not in data
+    restored = pickle.loads(data)
+    assert np.array_equal(zone_features(restored, 2.0 * levels), zone_features(history, 2.0 * levels))
 
 
 def test_features_of_columns_have_the_sign_of_the_motion():
