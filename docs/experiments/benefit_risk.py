@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
+from lgmd_gym.benchmark.case import is_traffic
 from lgmd_gym.benchmark.run_folder import StoredRun, read_run
 from lgmd_gym.benchmark.summary import rate_of, without_fcw_driver
 from lgmd_gym.benchmark.traffic.summary import traffic_summaries
@@ -41,8 +42,13 @@ def points_of(threats: StoredRun, traffic: StoredRun) -> list[Point]:
     """Return the results of the agents of both runs, in the order of the first.
 
     Raises:
-        ValueError: If the runs have no agent in common.
+        ValueError: If one of the runs is of another kind, or they have no agent in common that has played.
     """
+    if is_traffic(threats.config.suite) or not is_traffic(traffic.config.suite):
+        raise ValueError(
+            f"the runs must be of everyday-threats and traffic, in this order, got {threats.config.suite} "
+            f"and {traffic.config.suite}"
+        )
     drives = {item.agent: item for item in traffic_summaries(traffic.rows)}
     points: list[Point] = []
     for agent in threats.config.agents:
@@ -51,7 +57,8 @@ def points_of(threats: StoredRun, traffic: StoredRun) -> list[Point]:
                 row for row in without_fcw_driver(threats.rows) if row["agent"] == agent and row["threat"]
             ]
             lost = drives[agent].per_100km(drives[agent].speed_lost)
-            points.append(Point(agent, lost, rate_of(rows, "avoided")))
+            if rows and drives[agent].drives:
+                points.append(Point(agent, lost, rate_of(rows, "avoided")))
     if not points:
         raise ValueError(
             f"the runs must have an agent in common, got {' '.join(threats.config.agents)} "
@@ -105,7 +112,10 @@ def main(arguments: Sequence[str] | None = None) -> list[Point]:
     parser.add_argument("threats", type=Path, help="folder of lgmd-gym bench --suite everyday-threats")
     parser.add_argument("traffic", type=Path, help="folder of lgmd-gym bench --suite traffic")
     options = parser.parse_args(arguments)
-    points = points_of(read_run(options.threats), read_run(options.traffic))
+    try:
+        points = points_of(read_run(options.threats), read_run(options.traffic))
+    except ValueError as error:
+        parser.error(str(error))
     draw(points, options.file)
     for point in points:
         print(f"{point.agent}: {point.avoided.k}/{point.avoided.n}, {point.speed_lost:.1f} m/s per 100 km")

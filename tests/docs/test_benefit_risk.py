@@ -7,8 +7,8 @@ from support.examples import load
 from support.rows import threat_row
 
 
-def run(agents, rows):
-    return SimpleNamespace(config=SimpleNamespace(agents=agents), rows=rows)
+def run(agents, rows, suite="everyday-threats"):
+    return SimpleNamespace(config=SimpleNamespace(agents=agents, suite=suite), rows=rows)
 
 
 def threats(agents, avoided):
@@ -39,7 +39,7 @@ def traffic(lost):
         threat_row(agent, "traffic/merge", world=0, distance=50_000.0, speed_lost=value) | counts
         for agent, value in lost.items()
     ]
-    return run(list(lost), rows)
+    return run(list(lost), rows, "traffic")
 
 
 def test_points_are_the_shares_and_the_speed_lost_per_100_km():
@@ -68,3 +68,16 @@ def test_the_figure_is_written(monkeypatch, tmp_path, capsys):
 def test_runs_without_a_common_agent_are_rejected():
     with pytest.raises(ValueError, match="must have an agent in common, got a and b"):
         load("benefit_risk").points_of(threats(["a"], [True]), traffic({"b": 0.0}))
+
+
+def test_runs_in_the_other_order_are_rejected():
+    with pytest.raises(ValueError, match="in this order, got traffic and everyday-threats"):
+        load("benefit_risk").points_of(traffic({"a": 0.0}), threats(["a"], [True]))
+
+
+def test_agents_that_have_not_played_are_left_out():
+    failed = threat_row("b", "everyday-threats/LowBox/v1", threat=None, fcw_driver=False, error="Error")
+    runs = threats(["a"], [True])
+    runs.config.agents, runs.rows = ["a", "b"], [*runs.rows, failed]
+    points = load("benefit_risk").points_of(runs, traffic({"a": 1.0, "b": 1.0}))
+    assert [point.agent for point in points] == ["a"]
