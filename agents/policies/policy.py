@@ -119,7 +119,8 @@ class Policy(StagedAgent):
     Attributes:
         card: The card.
         features: Inputs of the policy and its decision rate.
-        network: The policy of stable-baselines3, a `BasePolicy`, whose bias includes the margin.
+        network: The policy of stable-baselines3, a `BasePolicy`, whose bias includes the margin. Decisions
+            use a copy of most networks, see `DenseNetwork`: a change of these weights has no effect on them.
 
     Raises:
         ValueError: If the file cannot be read or has no card, if the card has other fields or columns than
