@@ -212,6 +212,9 @@ class DenseNetwork:
 
         Args:
             inputs: Inputs by name, arrays of shape (N, …).
+
+        Raises:
+            ValueError: For another number of inputs than that of the network. Kernels do not check it.
         """
         flat = [inputs[name].reshape(len(inputs[name]), -1) for name in self._names]
         values = np.ascontiguousarray(np.concatenate(flat, axis=1, dtype=np.float32))
@@ -222,6 +225,11 @@ class DenseNetwork:
                 return self._layers(torch.from_numpy(values)).numpy()
         for step in self._steps:
             if isinstance(step, tuple):
+                if values.shape[1] != len(step[0]):
+                    raise ValueError(
+                        f"the policy requires {len(step[0])} inputs, got {values.shape[1]}; compare the "
+                        "cameras and the history of its card with those of its training"
+                    )
                 out = np.empty((len(values), len(step[1])), np.float32)
                 affine(values, *step, out)
                 values = out

@@ -59,6 +59,16 @@ def test_values_do_not_depend_on_the_number_of_environments(activation):
             assert np.array_equal(part, together[row : row + count])
 
 
+@pytest.mark.parametrize("count", [5, 9])
+def test_another_number_of_inputs_is_rejected(count):
+    """A kernel would read beyond the end of the inputs."""
+    layers = dense_layers(network(actions=2))
+    assert layers is not None
+    inputs = {"columns": np.ones((1, count), np.float32), "ego_speed": np.ones((1, 1), np.float32)}
+    with pytest.raises(ValueError, match=f"requires 7 inputs, got {count + 1}; compare"):
+        DenseNetwork(layers, tuple(INPUTS))(inputs)
+
+
 def test_networks_with_frames_or_continuous_actions_are_left_to_stable_baselines3():
     assert dense_layers(network(inputs=FRAME)) is None
     assert dense_layers(network(actions=None)) is None
