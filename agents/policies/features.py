@@ -236,6 +236,8 @@ class FeatureHistory:
         for name in self._required:
             if name not in observations:
                 raise ValueError(f"the policy requires the observation {name!r}, got {sorted(observations)}")
+        for name in self._fields.parts:
+            check_zone_shape(name, np.shape(observations[source_observation(name)])[1:])
         if not self._allocated:
             self._allocate(observations)
         for name, part in self._parts.items():
@@ -349,7 +351,6 @@ class _Fields:
         for name, part in self.parts.items():
             source, _, first, last = ZONE_INPUTS[name]
             signal = np.asarray(observations[source])
-            check_zone_shape(name, signal.shape[1:])
             place = part.start // NUM_LEVELS
             self._signals[chosen, place : place + last - first] = signal[chosen, first:last]
         update_fields(
@@ -380,11 +381,6 @@ def shrink_frames(frames: np.ndarray, side: int) -> np.ndarray:
     blocks = frames[:, : rows * side, : columns * side].reshape(count, rows, side, columns, side, channels)
     means: np.ndarray = blocks.mean(axis=(2, 4), dtype=np.float32)
     return np.round(means).astype(np.uint8)
-
-
-def weaker(level: np.ndarray, last: np.ndarray) -> np.ndarray:
-    """Return the level with the smaller magnitude, of two frames, so that a single frame is not enough."""
-    return np.where(np.abs(level) <= np.abs(last), level, last)
 
 
 def check_zone_shape(name: str, shape: tuple[int, ...]) -> None:

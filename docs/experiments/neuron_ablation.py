@@ -35,7 +35,7 @@ from gymnasium.utils import seeding
 
 import lgmd_gym
 from lgmd_gym.agents.policies.evidence import TimeToBrakeParams
-from lgmd_gym.agents.policies.features import CLIP, GAINS, NORM, NUM_LEVELS, FeatureConfig, weaker
+from lgmd_gym.agents.policies.features import CLIP, GAINS, NORM, NUM_LEVELS, FeatureConfig
 from lgmd_gym.agents.rules import excitation
 from lgmd_gym.agents.sides import (
     FORWARD_COLUMNS,
@@ -257,7 +257,8 @@ def features_of(levels: np.ndarray) -> np.ndarray:
         mean = mean + np.maximum(GAINS, 1.0 / (1 + time)).astype(np.float32) * (level - mean)
         means[time] = mean
     last = np.concatenate([values[:1], values[:-1]])
-    parts = [weaker(values, last), means.reshape(len(values), -1)]
+    weaker = np.where(np.abs(values) <= np.abs(last), values, last)
+    parts = [weaker, means.reshape(len(values), -1)]
     return np.concatenate(parts, axis=1)[:: FEATURES.repeat].astype(np.float16)
 
 

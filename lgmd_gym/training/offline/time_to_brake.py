@@ -133,7 +133,8 @@ class TimeToBrakeLearner:
             train: Training decisions.
             validation: Decisions evaluated after each epoch.
             log: Called after each epoch with its number and its metrics.
-            jobs: Number of threads that train the networks of an ensemble; it does not change the result.
+            jobs: Number of threads that train the networks of an ensemble, beside the calling thread, which
+                prepares batches; it does not change the result.
 
         Raises:
             ValueError: If no epoch has a finite validation loss.
