@@ -88,5 +88,7 @@ def _reduction(name):
 
 least_double, greatest_double = _reduction("fmin"), _reduction("fmax")
 
+overload_operator(operator.add, elementwise(2, lambda b, x, y: b.fadd(x, y), doubles), doubles)
+overload_operator(operator.sub, elementwise(2, lambda b, x, y: b.fsub(x, y), doubles), doubles)
 overload_operator(operator.mul, elementwise(2, lambda b, x, y: b.fmul(x, y), doubles), doubles)
 overload_operator(operator.truediv, elementwise(2, lambda b, x, y: b.fdiv(x, y), doubles), doubles)

@@ -5,8 +5,14 @@ import math
 import numpy as np
 import pytest
 from support.cameras import ego_camera
+from support.records import frustum_of, lens_of, records
 from support.roads import add_car, lens_x, straight_env
 
+from lgmd_gym.camera.objects import MODEL_CAR, OBJECT
+from lgmd_gym.camera.render.buffers import GroundLayer
+from lgmd_gym.camera.render.coverage import add_polygon
+from lgmd_gym.camera.render.ground import CAST
+from lgmd_gym.camera.render.shadows import add_shadow_of
 from lgmd_gym.camera.worlds import draw_world
 
 PLAIN = {"texture": 0.0, "roadside": 0.0}
@@ -79,3 +85,22 @@ def test_shadow_of_an_object_that_passes_the_lens_within_the_exposure(gain):
                 found += 1
                 assert blurred[row, column] == pytest.approx(sharp[row, column], rel=0.1)
     assert found >= 3
+
+
+@pytest.mark.parametrize("roll", [0.0, 0.3, -0.1])
+def test_shadow_rolls_with_the_lens(roll):
+    """The shadow of a plate on the ground is the plate itself, 2 m by 1 m, 8 m ahead and 1 m to the right."""
+    shape, pose = (80, 120), {"roll": roll}
+    coverage = np.zeros((4, shape[0], shape[1] + 2), np.float32)
+    layer = GroundLayer(coverage, np.zeros((3, 16)), np.zeros((2, 20)), np.zeros((2, 8)), frustum_of(**pose))
+    plate = {"x": 8.0, "y": 1.0, "cos": 1.0, "length": 2.0, "width": 1.0, "model": MODEL_CAR}
+    add_shadow_of(layer, lens_of(**pose), records(OBJECT, plate)[0], (0.5, 0.2), 1.0)
+    corners = []
+    for ahead, across in ((7.0, 0.5), (7.0, 1.5), (9.0, 1.5), (9.0, 0.5)):
+        right, down = 100.0 * across / ahead, 100.0 / ahead  # the lens is 1 m high
+        u = 60.0 + right * math.cos(roll) + down * math.sin(roll)
+        corners.append((u, 40.0 + down * math.cos(roll) - right * math.sin(roll)))
+    expected = np.zeros((2, *coverage.shape[1:]), np.float32)
+    add_polygon(expected, 0, np.transpose(corners).copy(), 4, 1.0, 0.0)
+    assert abs(expected).sum() > 4.0
+    assert np.cumsum(coverage[CAST], axis=1) == pytest.approx(np.cumsum(expected[0], axis=1), abs=1e-5)

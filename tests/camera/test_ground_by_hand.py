@@ -126,7 +126,7 @@ def painted(*lines, yaw=0.0, x=0.0, y=0.0, shape=(160, 120)):
     coverage = np.zeros((4, shape[0], shape[1] + 2), np.float32)
     pose = {"yaw": yaw, "pitch": -pi / 2 + 1e-9, "z": 10.0, "x": x, "y": y, "shape": shape}
     lens = lens_of(**pose)
-    layer = GroundLayer(coverage, np.zeros((3, 16)), np.zeros((2, 20)), np.zeros(8), frustum_of(**pose))
+    layer = GroundLayer(coverage, np.zeros((3, 16)), np.zeros((2, 20)), np.zeros((2, 8)), frustum_of(**pose))
     names = LINE.names
     pieces = records(LINE, *(dict(zip(names, map(float, line), strict=True)) for line in lines))
     add_lines(layer, lens, pieces, LOOK)
@@ -184,7 +184,7 @@ def test_far_stripes_are_painted_as_their_mean():
     shape = (80, 120)
     coverage = np.zeros((4, shape[0], shape[1] + 2), np.float32)
     lens, frustum = lens_of(shape=shape), frustum_of(shape=shape)
-    layer = GroundLayer(coverage, np.zeros((3, 16)), np.zeros((2, 20)), np.zeros(8), frustum)
+    layer = GroundLayer(coverage, np.zeros((3, 16)), np.zeros((2, 20)), np.zeros((2, 8)), frustum)
     solid = coverage.copy()
     # Z²/(f·h) = 3·4.33 m at Z = 36 m; from 40 m on no stripe is separate.
     for striped, target in ((1.0, coverage), (0.0, solid)):

@@ -56,7 +56,7 @@ class Buffers(NamedTuple):
     solids: np.ndarray
     corners: np.ndarray  # corners of a polygon as (depth, right, down), float64, shape (3, 16) [m]
     uv: np.ndarray  # projected corners of a polygon, float64, shape (2, 20) [px]
-    quad: np.ndarray  # x, y of four corners on the ground, float64, shape (8,) [m]
+    outline: np.ndarray  # x, y of up to eight corners on the ground relative to the lens, float64, (2, 8) [m]
     axes: np.ndarray  # axes of an object, see `place_object`, float64, shape (5, 3)
     greys: np.ndarray  # grey and light of the polygons of all models, float64, shape (polygons, 2)
     # joints of a figure, see `pose_figure`; then in camera axes, float64, shape (56, 3) [m]
@@ -74,7 +74,7 @@ class GroundLayer(NamedTuple):
     coverage: np.ndarray
     corners: np.ndarray
     uv: np.ndarray
-    quad: np.ndarray
+    outline: np.ndarray
     frustum: np.record
 
 
@@ -100,7 +100,7 @@ def make_buffers(shape: tuple[int, int], polygons: int) -> Buffers:
         solids=np.zeros((2, height, width + 2), dtype=np.float32),
         corners=np.zeros((3, 16)),
         uv=np.zeros((2, 20)),
-        quad=np.zeros(8),
+        outline=np.zeros((2, 8)),
         axes=np.zeros((5, 3)),
         greys=np.zeros((polygons, 2)),
         joints=np.zeros((MAX_JOINTS, 3)),

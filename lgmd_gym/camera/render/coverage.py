@@ -16,6 +16,13 @@ import math
 import numba as nb
 
 from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.doubles import (
+    greatest_double,
+    least_double,
+    madd_doubles,
+    splat_double,
+    store_doubles,
+)
 from lgmd_gym.kernels.simd import (
     LANES,
     any_different,
@@ -266,6 +273,30 @@ def clip_and_project(lens, corners, n, out):
             m += 1
         d0, r0, z0 = d1, r1, z1
     return m
+
+
+@kernel(inline=True)
+def project_eight(lens, depth, right, down, n, layer):
+    """Project up to eight corners, lanes of float64, to `layer.uv`; unused lanes repeat a corner.
+
+    Returns:
+        Number of projected corners, below 3 for a polygon behind the near plane, and their bounds (left, top,
+        right, bottom) [px].
+    """
+    uv = layer.uv
+    if least_double(depth) < NEAR:
+        stride = layer.corners.shape[1]
+        store_doubles(layer.corners, 0, depth)
+        store_doubles(layer.corners, stride, right)
+        store_doubles(layer.corners, 2 * stride, down)
+        n = clip_and_project(lens, layer.corners, n, uv)
+        return n, bounds(uv, max(n, 1))
+    scale = splat_double(lens.focal) / depth
+    u = madd_doubles(scale, right, splat_double(lens.centre_u))
+    v = madd_doubles(scale, down, splat_double(lens.centre_v))
+    store_doubles(uv, 0, u)
+    store_doubles(uv, uv.shape[1], v)
+    return n, (least_double(u), least_double(v), greatest_double(u), greatest_double(v))
 
 
 @kernel(inline=True)

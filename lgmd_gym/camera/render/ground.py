@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numba as nb
 import numpy as np
 
-from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, sum_differences, winding
+from lgmd_gym.camera.render.coverage import NEAR, add_polygon, project_eight, sum_differences, winding
 from lgmd_gym.camera.render.light import row_air, through_air
 from lgmd_gym.camera.render.texture import (
     bend_of,
@@ -28,6 +28,13 @@ from lgmd_gym.camera.render.texture import (
     texture_line,
 )
 from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.doubles import (
+    greatest_double,
+    least_double,
+    load_doubles,
+    madd_doubles,
+    splat_double,
+)
 from lgmd_gym.kernels.simd import (
     LANES,
     any_above,
@@ -47,35 +54,59 @@ from lgmd_gym.kernels.simd import (
 ROAD, PAINT, SHADOW, CAST = np.int64(0), np.int64(1), np.int64(2), np.int64(3)
 
 
+RECTANGLE = np.array([(-1.0, -1.0, 1.0, 1.0, *[-1.0] * 4), (-1.0, 1.0, 1.0, -1.0, *[-1.0] * 4)])
+"""Corners of a rectangle along and across, as shares of half its sides, then the first one again."""
+
+
+@kernel
+def add_level_polygon(layer, k, lens, ahead, across, n, weight):
+    """Add a polygon of the ground, of either winding, to channel k.
+
+    Args:
+        layer: `GroundLayer`.
+        k: Channel.
+        lens: The lens.
+        ahead: Distances of up to eight corners ahead of the lens, lanes of float64 [m]; unused lanes repeat a
+            corner.
+        across: Distances to the right, likewise.
+        n: Number of corners.
+        weight: Weight.
+    """
+    if not (greatest_double(ahead) > layer.frustum.near and least_double(ahead) < layer.frustum.far):
+        return
+    height, cos, sin = splat_double(lens.z), splat_double(lens.cos_pitch), splat_double(lens.sin_pitch)
+    c, s = splat_double(lens.cos_roll), splat_double(lens.sin_roll)
+    depth, down = ahead * cos - height * sin, madd_doubles(ahead, sin, height * cos)
+    if greatest_double(depth) < NEAR:
+        return
+    n, _ = project_eight(lens, depth, madd_doubles(across, c, down * s), down * c - across * s, n, layer)
+    if n >= 3:
+        add_polygon(layer.coverage, k, layer.uv, n, weight if winding(layer.uv, n) > 0.0 else -weight, 0.0)
+
+
+@kernel
+def add_ground_polygon(layer, k, lens, x, y, n, weight):
+    """Add a polygon of the ground to channel k; `x` and `y` are relative to the lens, see above [m]."""
+    c, s = splat_double(lens.cos_yaw), splat_double(lens.sin_yaw)
+    add_level_polygon(layer, k, lens, madd_doubles(x, c, y * s), y * c - x * s, n, weight)
+
+
+@kernel
+def add_outline(layer, k, lens, n, weight):
+    """Add the polygon with the n corners in `layer.outline` to channel k."""
+    outline = layer.outline
+    for i in range(n, outline.shape[1]):
+        outline[0, i], outline[1, i] = outline[0, 0], outline[1, 0]
+    x, y = load_doubles(outline, 0), load_doubles(outline, outline.shape[1])
+    add_ground_polygon(layer, k, lens, x, y, n, weight)
+
+
 @kernel
 def add_ground_quad(layer, k, lens, quad, weight):
     """Add a quad of the ground, given as x, y of its four corners, to channel k."""
-    corners = layer.corners
-    nearest, farthest = math.inf, -math.inf
     for i in range(4):
-        dx, dy = quad[2 * i] - lens.x, quad[2 * i + 1] - lens.y
-        ahead = dx * lens.cos_yaw + dy * lens.sin_yaw
-        nearest, farthest = min(nearest, ahead), max(farthest, ahead)
-        corners[0, i] = ahead * lens.cos_pitch - lens.z * lens.sin_pitch
-        corners[1, i] = dy * lens.cos_yaw - dx * lens.sin_yaw
-        corners[2, i] = ahead * lens.sin_pitch + lens.z * lens.cos_pitch
-    if farthest > layer.frustum.near and nearest < layer.frustum.far:
-        add_quad(layer, k, lens, weight)
-
-
-@kernel
-def add_quad(layer, k, lens, weight):
-    """Add the quad in `layer.corners`, given for a lens without roll, of either winding, to channel k."""
-    corners, uv = layer.corners, layer.uv
-    c, s = lens.cos_roll, lens.sin_roll
-    for i in range(4):
-        right, down = corners[1, i], corners[2, i]
-        corners[1, i], corners[2, i] = right * c + down * s, down * c - right * s
-    if max(max(corners[0, 0], corners[0, 1]), max(corners[0, 2], corners[0, 3])) < NEAR:
-        return
-    n = clip_and_project(lens, corners, 4, uv)
-    if n >= 3:
-        add_polygon(layer.coverage, k, uv, n, weight if winding(uv, n) > 0.0 else -weight, 0.0)
+        layer.outline[0, i], layer.outline[1, i] = quad[2 * i] - lens.x, quad[2 * i + 1] - lens.y
+    add_outline(layer, k, lens, 4, weight)
 
 
 @kernel
@@ -217,16 +248,13 @@ class ViewedLine(NamedTuple):
 @kernel
 def _add_stroke(layer, lens, line, a, b, weight):
     """Add the part [a, b] of a `ViewedLine` [m]; `weight` is 1, or the share that is painted."""
-    ha, hc = -0.5 * line.width * line.d_across, 0.5 * line.width * line.d_ahead
-    cos, sin, corners = lens.cos_pitch, lens.sin_pitch, layer.corners
-    for i in range(4):
-        t = a if i < 2 else b
-        side = -1.0 if i == 0 or i == 3 else 1.0
-        forward = line.ahead + t * line.d_ahead + side * ha
-        corners[0, i] = forward * cos - lens.z * sin
-        corners[1, i] = line.across + t * line.d_across + side * hc
-        corners[2, i] = forward * sin + lens.z * cos
-    add_quad(layer, PAINT, lens, weight)
+    along, side = load_doubles(RECTANGLE, 0), load_doubles(RECTANGLE, RECTANGLE.shape[1])
+    middle, half = splat_double(0.5 * (a + b)), splat_double(0.5 * (b - a))
+    t = madd_doubles(along, half, middle)
+    ha, hc = splat_double(-0.5 * line.width * line.d_across), splat_double(0.5 * line.width * line.d_ahead)
+    ahead = madd_doubles(t, splat_double(line.d_ahead), madd_doubles(side, ha, splat_double(line.ahead)))
+    across = madd_doubles(t, splat_double(line.d_across), madd_doubles(side, hc, splat_double(line.across)))
+    add_level_polygon(layer, PAINT, lens, ahead, across, 4, weight)
 
 
 @kernel

@@ -147,7 +147,7 @@ def draw_light(view, road, tables, models, seen, member, vehicles, buffers):
         coverage=buffers.ground,
         corners=buffers.corners,
         uv=buffers.uv,
-        quad=buffers.quad,
+        outline=buffers.outline,
         frustum=seen.frusta[member],
     )
     add_flats(ground, view, road, seen, n, member, clock)
@@ -318,8 +318,8 @@ def _see_from(lenses, mount, objects, count, roadside, look, lamps, seen):
 def draw_last_stages(frames, inputs):
     """Draw what is near and expose the frame of the first camera.
 
-    These stages are a third of `draw_cameras`. A second process compiles them for numba's cache; this function
-    has no other purpose. The arguments are as there.
+    These stages are a third of `draw_cameras`. A second process compiles them for numba's cache; this
+    function has no other purpose. The arguments are as there.
     """
     batch, _, _, variants, space = inputs.arrays
     places, _, lenses, views = batch

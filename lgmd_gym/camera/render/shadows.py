@@ -24,10 +24,10 @@ from lgmd_gym.camera.objects import (
     is_figure,
     light_of_code,
 )
-from lgmd_gym.camera.render.coverage import NEAR, add_polygon, clip_and_project, winding
-from lgmd_gym.camera.render.ground import CAST, PAINT, SHADOW, add_ground_quad
+from lgmd_gym.camera.render.ground import CAST, PAINT, RECTANGLE, SHADOW, add_ground_polygon, add_outline
 from lgmd_gym.camera.render.seen import MAX_SEEN, beside, distance, first_from, outside_band
 from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.doubles import load_doubles, madd_doubles, splat_double
 
 # Legs and wheels keep less of the sky's light from the road than a body close above it.
 _FIGURE_SPREAD, _FIGURE_SHARE = 0.3, 0.6
@@ -36,15 +36,13 @@ _FIGURE_SPREAD, _FIGURE_SHARE = 0.3, 0.6
 @kernel
 def _add_footprint(layer, k, lens, obj, centre, grow, weight):
     """Add an object's rectangle on the ground, around `centre` and grown on all sides, to channel k."""
-    x, y = centre
     hx, hy = 0.5 * obj.length + grow, 0.5 * obj.width + grow
-    quad = layer.quad
-    for i in range(4):
-        lx = -hx if i < 2 else hx
-        ly = -hy if i == 0 or i == 3 else hy
-        quad[2 * i] = x + lx * obj.cos - ly * obj.sin
-        quad[2 * i + 1] = y + lx * obj.sin + ly * obj.cos
-    add_ground_quad(layer, k, lens, quad, weight)
+    along, side = load_doubles(RECTANGLE, 0), load_doubles(RECTANGLE, RECTANGLE.shape[1])
+    x = madd_doubles(side, splat_double(-hy * obj.sin), splat_double(centre[0] - lens.x))
+    y = madd_doubles(side, splat_double(hy * obj.cos), splat_double(centre[1] - lens.y))
+    x = madd_doubles(along, splat_double(hx * obj.cos), x)
+    y = madd_doubles(along, splat_double(hx * obj.sin), y)
+    add_ground_polygon(layer, k, lens, x, y, 4, weight)
 
 
 @kernel
@@ -169,21 +167,21 @@ def add_cast_shadows(layer, view, seen, roadside):
         if outside_band(frustum, ahead, caster.radius) or beside(frustum, ahead, across, caster.radius):
             continue
         if caster.index >= MAX_SEEN:
-            _add_shadow_of(layer, lens, roadside[caster.index - MAX_SEEN], away, caster.weight)
+            add_shadow_of(layer, lens, roadside[caster.index - MAX_SEEN], away, caster.weight)
         # With a shutter, the objects are those that are not behind the lens at the end of the exposure.
         elif look.shutter_s > 0.0 or not behind(frustum, seen.objects[caster.index]):
-            _add_shadow_of(layer, lens, seen.objects[caster.index], away, caster.weight)
+            add_shadow_of(layer, lens, seen.objects[caster.index], away, caster.weight)
 
 
 @kernel
-def _add_shadow_of(layer, lens, obj, away, weight):
+def add_shadow_of(layer, lens, obj, away, weight):
     """Add the shadow of one object; `away` is the shift of a point 1 m above the ground [m]."""
     if obj.model == MODEL_TREE:
         n = _crown_outline(layer, lens, obj, away)
-        _add_outline(layer, lens, n, weight)
+        add_outline(layer, CAST, lens, n, weight)
         trunk = 0.06 * obj.width
         n = _box_outline(layer, lens, obj, away, (trunk, trunk), (0.0, 0.3 * obj.height))
-        _add_outline(layer, lens, n, weight)
+        add_outline(layer, CAST, lens, n, weight)
         return
     if is_figure(obj.model):
         for k in range(2):
@@ -193,20 +191,11 @@ def _add_shadow_of(layer, lens, obj, away, weight):
                 (box[2] * obj.height, box[3] * obj.height),
             )
             n = _box_outline(layer, lens, obj, away, sides, heights)
-            _add_outline(layer, lens, n, box[4] * weight)
+            add_outline(layer, CAST, lens, n, box[4] * weight)
         return
     sides = (0.5 * obj.length, 0.5 * obj.width)
     n = _box_outline(layer, lens, obj, away, sides, (obj.base, obj.height))
-    _add_outline(layer, lens, n, weight)
-
-
-@kernel
-def _write_corner(layer, lens, i, x, y):
-    """Write corner i, relative to the lens on the ground [m], in camera axes."""
-    ahead = x * lens.cos_yaw + y * lens.sin_yaw
-    layer.corners[0, i] = ahead * lens.cos_pitch - lens.z * lens.sin_pitch
-    layer.corners[1, i] = y * lens.cos_yaw - x * lens.sin_yaw
-    layer.corners[2, i] = ahead * lens.sin_pitch + lens.z * lens.cos_pitch
+    add_outline(layer, CAST, lens, n, weight)
 
 
 @kernel
@@ -234,7 +223,7 @@ def _box_outline(layer, lens, obj, away, sides, heights):
             height = high if facing > 0.0 else low
             x = dx + lx * obj.cos - ly * obj.sin + height * away[0]
             y = dy + lx * obj.sin + ly * obj.cos + height * away[1]
-            _write_corner(layer, lens, n, x, y)
+            layer.outline[0, n], layer.outline[1, n] = x, y
             n += 1
     return n
 
@@ -250,19 +239,5 @@ def _crown_outline(layer, lens, obj, away):
     long = math.sqrt(radius * radius + (half * shift) ** 2)
     for k in range(_CROWN.shape[0]):
         a, b = long * _CROWN[k, 0], radius * _CROWN[k, 1]
-        _write_corner(layer, lens, k, x + a * c - b * s, y + a * s + b * c)
+        layer.outline[0, k], layer.outline[1, k] = x + a * c - b * s, y + a * s + b * c
     return _CROWN.shape[0]
-
-
-@kernel
-def _add_outline(layer, lens, n, weight):
-    """Add the polygon of the first n corners, of either winding."""
-    deepest = layer.corners[0, 0]
-    for k in range(1, n):
-        deepest = max(deepest, layer.corners[0, k])
-    if deepest < NEAR:
-        return
-    m = clip_and_project(lens, layer.corners, n, layer.uv)
-    if m >= 3:
-        signed = weight if winding(layer.uv, m) > 0.0 else -weight
-        add_polygon(layer.coverage, CAST, layer.uv, m, signed, 0.0)

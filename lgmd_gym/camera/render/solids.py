@@ -9,19 +9,12 @@ import numba as nb
 import numpy as np
 
 from lgmd_gym.camera.objects import is_picture
-from lgmd_gym.camera.render.coverage import NEAR, add_polygon, bounds, clip_and_project, sum_differences
+from lgmd_gym.camera.render.coverage import add_polygon, project_eight, sum_differences
 from lgmd_gym.camera.render.light import row_slope, veil_at
 from lgmd_gym.camera.render.models.builder import BODY, LAMP, TAIL, UNDER
 from lgmd_gym.camera.render.seen import distance
 from lgmd_gym.kernels import kernel
-from lgmd_gym.kernels.doubles import (
-    greatest_double,
-    least_double,
-    load_doubles,
-    madd_doubles,
-    splat_double,
-    store_doubles,
-)
+from lgmd_gym.kernels.doubles import load_doubles, madd_doubles, splat_double
 from lgmd_gym.kernels.simd import (
     LANES,
     any_above,
@@ -82,30 +75,13 @@ def _along(axes, k, a, b, c):
 
 @kernel(inline=True)
 def _place_polygon(lens, models, p, layer):
-    """Project polygon p of an object to `layer.uv`.
-
-    Returns:
-        Number of projected corners, below 3 for a polygon behind the near plane, and their bounds (left, top,
-        right, bottom) [px].
-    """
-    corners, n, uv = models.corners[p], models.corners_used[p], layer.uv
+    """Project polygon p of an object; see `project_eight`."""
+    corners = models.corners[p]
     size = corners.shape[1]
     a, b, c = load_doubles(corners, 0), load_doubles(corners, size), load_doubles(corners, 2 * size)
     depth = _along(layer.axes, 0, a, b, c)
     right, down = _along(layer.axes, 1, a, b, c), _along(layer.axes, 2, a, b, c)
-    if least_double(depth) < NEAR:
-        stride = layer.corners.shape[1]
-        store_doubles(layer.corners, 0, depth)
-        store_doubles(layer.corners, stride, right)
-        store_doubles(layer.corners, 2 * stride, down)
-        n = clip_and_project(lens, layer.corners, n, uv)
-        return n, bounds(uv, max(n, 1))
-    scale = splat_double(lens.focal) / depth
-    u = madd_doubles(scale, right, splat_double(lens.centre_u))
-    v = madd_doubles(scale, down, splat_double(lens.centre_v))
-    store_doubles(uv, 0, u)
-    store_doubles(uv, uv.shape[1], v)
-    return n, (least_double(u), least_double(v), greatest_double(u), greatest_double(v))
+    return project_eight(lens, depth, right, down, models.corners_used[p], layer)
 
 
 @kernel
