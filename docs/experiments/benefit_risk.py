@@ -68,9 +68,9 @@ def points_of(threats: StoredRun, traffic: StoredRun) -> list[Point]:
 
 
 def curves_of(points: Iterable[Point]) -> dict[str, list[Point]]:
-    """Return the points by the agent without options, in the order of the speed lost."""
+    """Return the points by the agent without options, in the order of the speed lost, then of the avoided."""
     curves: dict[str, list[Point]] = {}
-    for point in sorted(points, key=lambda item: item.speed_lost):
+    for point in sorted(points, key=lambda item: (item.speed_lost, item.avoided.k)):
         curves.setdefault(family_of(point.agent), []).append(point)
     return curves
 
@@ -91,9 +91,11 @@ def draw(points: Sequence[Point], file: Path) -> None:
             for value in (lambda rate: rate.k / rate.n, lambda rate: rate.low, lambda rate: rate.high)
         )
         axes.errorbar(x, y, [y - low, high - y], fmt="o-", markersize=4, capsize=2, linewidth=1, label=family)
-        for point, left, height in zip(curve, x, y, strict=True):
+        for number, (point, left, height) in enumerate(zip(curve, x, y, strict=True)):
             options = ":".join(part for part in point.agent.split(":") if "=" in part)
-            axes.annotate(options, (left, height), (4, 3), textcoords="offset points", fontsize=6)
+            # In turn above and below the curve, so that labels of near points do not overlap.
+            side = {"va": "top", "xytext": (4, -4)} if number % 2 else {"va": "bottom", "xytext": (4, 4)}
+            axes.annotate(options, (left, height), textcoords="offset points", fontsize=6, **side)
     axes.set_xscale("symlog", linthresh=LINEAR_TO)
     axes.set_xlim(left=0.0)
     axes.set_ylim(0.0, 100.0)

@@ -14,7 +14,7 @@ START = _FIFTH
 
 @kernel(exact=True)
 def add_hash(state, value_hash):
-    """Return the state after one more element, given its hash; that of a small integer is itself, of -1 -2."""
+    """Return the state after one more element, given its hash, see Python's `hash`; that of -1 is -2."""
     state = np.uint64(state) + np.uint64(value_hash) * _SECOND
     return ((state << np.uint64(31)) | (state >> np.uint64(33))) * _FIRST
 
