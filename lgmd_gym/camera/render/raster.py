@@ -407,7 +407,7 @@ def draw_cameras(first, last, frames, selected, inputs):
                 )
                 # Of objects that hide each other in turn, each lens sees others.
                 if not ordered and end - start > 1:
-                    order_objects(seen.frusta[k - start], view.lens.focal, 1 << (k - start), seen)
+                    order_objects(seen.frusta[k - start], lenses[env, k, 0].focal, 1 << (k - start), seen)
                 tables, opening = tables_at(places[env, k]), lenses[env, k, 1]
                 draw_frame(
                     frames[env, k], view, opening, road, tables, models, seen, k - start, vehicles, buffers
