@@ -93,7 +93,7 @@ def draw(points: Sequence[Point], file: Path) -> None:
         axes.errorbar(x, y, [y - low, high - y], fmt="o-", markersize=4, capsize=2, linewidth=1, label=family)
         for number, (point, left, height) in enumerate(zip(curve, x, y, strict=True)):
             options = ":".join(part for part in point.agent.split(":") if "=" in part)
-            # In turn above and below the curve, so that labels of near points do not overlap.
+            # In turn above and below the curve, for room between the labels of near points.
             side = {"va": "top", "xytext": (4, -4)} if number % 2 else {"va": "bottom", "xytext": (4, 4)}
             axes.annotate(options, (left, height), textcoords="offset points", fontsize=6, **side)
     axes.set_xscale("symlog", linthresh=LINEAR_TO)

@@ -8,6 +8,8 @@ have none of the three until Python calls them.
 """
 
 import gc
+import os
+import tempfile
 from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -28,6 +30,12 @@ from lgmd_gym.kernels.cache_folder import use_temporary_folder
 from lgmd_gym.kernels.compilation import report_compilation
 from lgmd_gym.kernels.sources import source_stamp
 
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+_NO_LINK = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 # Versions of numba with the internals that `Kernel` uses; with any other, `kernel` is `numba.njit`.
 _KNOWN = (0, 61) <= numba.version_info.short <= (0, 68)
 
@@ -161,11 +169,32 @@ def _without_garbage_collection() -> Generator[None, None, None]:
             gc.enable()
 
 
+@contextmanager
+def _one_process() -> Generator[None, None, None]:
+    """Keep the other processes of this user out of the block, where the system has such locks."""
+    file = None
+    with suppress(OSError):
+        path = os.path.join(tempfile.gettempdir(), f"lgmd-gym-cache-{os.getuid() if fcntl else 0}")
+        file = os.open(path, os.O_RDWR | os.O_CREAT | _NO_LINK, 0o600)
+        if fcntl is not None:
+            fcntl.flock(file, fcntl.LOCK_EX)
+    try:
+        yield
+    finally:
+        if file is not None:
+            os.close(file)
+
+
 class _Cache(FunctionCache):
     """Cache with separate entries for the two kinds of overloads."""
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         return *super()._index_key(sig, codegen), _is_inner()
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Store an overload; one process at a time, because numba reads, changes and writes an index."""
+        with _one_process():
+            super().save_overload(sig, data)
 
     def load_overload(self, sig: object, target_context: object) -> CompileResult | None:
         """Return a stored overload; None, after clearing the cache, if it names modules that were renamed."""

@@ -216,6 +216,8 @@ class FrameNeuron:
             out: Output, float64, shape (N, columns).
         """
         maps, sigma = self.column_map()
+        # No copy of the maps of this package; a model of your own may return a view.
+        maps = np.ascontiguousarray(maps, np.float32)
         column_potentials(first, last, active, maps, self.shape[1], sigma, out)
 
     def column_map(self) -> tuple[NDArray[np.float32], float]:

@@ -86,7 +86,7 @@ def column_potentials(first, last, active, maps, width, sigma, out) -> None:
         first: First neuron.
         last: Last neuron + 1.
         active: Selection of the neurons, bool, shape (N,).
-        maps: Maps, float32, shape (N, H, at least width).
+        maps: Maps, contiguous, float32, shape (N, H, at least width).
         width: Width of the maps without padding, a multiple of the number of columns [px].
         sigma: Mean at which K_c = 0.73.
         out: Output, float64, shape (N, columns).

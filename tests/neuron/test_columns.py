@@ -60,3 +60,15 @@ def test_invalid_columns_are_rejected():
         LPLC2(SHAPE).column_potentials(2)
     with pytest.raises(ValueError, match="columns require a neuron without mask and roi"):
         LGMD(SHAPE, roi=(0, 0, 20, 40)).column_potentials(2)
+
+
+@pytest.mark.parametrize("view", [np.asfortranarray, lambda maps: np.repeat(maps, 2, axis=2)[:, :, ::2]])
+def test_columns_of_a_map_that_is_not_contiguous(view, monkeypatch):
+    neuron = DSN(SHAPE, num=2)
+    for frames in np.random.default_rng(0).integers(0, 256, (5, 2, *SHAPE), np.uint8):
+        neuron.step(frames)
+    expected = neuron.column_potentials(5)
+    maps, sigma = neuron.column_map()
+    monkeypatch.setattr(neuron, "column_map", lambda: (view(maps), sigma))
+    assert np.array_equal(neuron.column_potentials(5), expected)
+    assert np.ptp(expected) > 0.0

@@ -36,6 +36,8 @@ in the frame [m], infinite above the horizon; the plane through the lens and the
 
 MAX_SEEN = 2 * MAX_DRAWN
 """Maximum number of objects that the lenses of an eye see."""
+MAX_CASTERS = 8 * MAX_DRAWN
+"""Maximum number of objects around an eye whose cast shadows are drawn; those of the least x are kept."""
 
 CASTER = np.dtype([("index", np.int64), *((name, np.float64) for name in ("x", "y", "radius", "weight"))])
 """An object with a cast shadow: its index in `Seen.objects`, or in the roadside plus `MAX_SEEN`; centre of a
@@ -57,7 +59,7 @@ class Seen(NamedTuple):
     faces: np.ndarray
     polygons: np.ndarray  # polygons of the objects that are turned towards the eye, int64
     lights: np.ndarray  # light on them, without headlights, float64
-    casters: np.ndarray  # `CASTER` records, see `shadows.find_casters`
+    casters: np.ndarray  # `CASTER` records, shape (4096,), see `shadows.find_casters`
     # numbers of objects, of those in `order`, of `polygons` in use, and of casters, int64, shape (4,)
     counts: np.ndarray
 
@@ -74,7 +76,7 @@ def make_seen(polygons: int) -> Seen:
         faces=np.zeros((MAX_SEEN, 2), np.int64),
         polygons=np.zeros(MAX_SEEN * polygons, np.int64),
         lights=np.zeros(MAX_SEEN * polygons),
-        casters=np.zeros(MAX_SEEN, CASTER),
+        casters=np.zeros(MAX_CASTERS, CASTER),
         counts=np.zeros(4, np.int64),
     )
 

@@ -113,7 +113,7 @@ _MOST_SHIFT = 8.0  # length of a shadow per height; at lower elevations of the s
 
 @kernel
 def find_casters(eye, look, vehicles, roadside, seen):
-    """Find the objects whose cast shadows the lenses of an eye may see, and write them to `seen`.
+    """Find the objects within 150 m of an eye, in all directions, that cast a shadow; write them to `seen`.
 
     Marks cast none. Boxes and barriers have their soft shadow only.
     """
