@@ -4,8 +4,10 @@
 
 import operator
 
+import numpy as np
 from llvmlite import ir
 from numba import types
+from numba.core import config
 from numba.extending import models, register_model
 
 from lgmd_gym.kernels.simd import call, elementwise, intrinsic, overload_operator, pointer_to
@@ -92,3 +94,16 @@ overload_operator(operator.add, elementwise(2, lambda b, x, y: b.fadd(x, y), dou
 overload_operator(operator.sub, elementwise(2, lambda b, x, y: b.fsub(x, y), doubles), doubles)
 overload_operator(operator.mul, elementwise(2, lambda b, x, y: b.fmul(x, y), doubles), doubles)
 overload_operator(operator.truediv, elementwise(2, lambda b, x, y: b.fdiv(x, y), doubles), doubles)
+
+if config.DISABLE_JIT:  # pyright: ignore[reportAttributeAccessIssue]
+    # For tests of the kernels of geometry without compilation: NumPy arrays in place of vectors.
+    globals().update(
+        load_doubles=lambda array, index: array.reshape(-1)[index : index + LANES].copy(),
+        store_doubles=lambda array, index, value: array.reshape(-1).__setitem__(
+            slice(index, index + LANES), value
+        ),
+        splat_double=lambda value: np.full(LANES, value),
+        madd_doubles=lambda x, y, z: x * y + z,
+        least_double=np.min,
+        greatest_double=np.max,
+    )
