@@ -110,15 +110,29 @@ def _is_first_worker() -> bool:
     global _lock
     if _is_main():
         return True
-    if fcntl is None:
-        return False
-    path = os.path.join(tempfile.gettempdir(), f"lgmd-gym-compiling-{os.getuid()}")
     try:
-        _lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
-        fcntl.flock(_lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        _lock = lock_of_user("compiling", wait=False)
     except OSError:
         return False
-    return True
+    return _lock is not None
+
+
+def lock_of_user(name: str, *, wait: bool) -> int | None:
+    """Return an open file that no other process of this user has locked; None without locks of files.
+
+    Raises:
+        OSError: If it cannot be opened, or another process has it and `wait` is false.
+    """
+    if fcntl is None:
+        return None
+    path = os.path.join(tempfile.gettempdir(), f"lgmd-gym-{name}-{os.getuid()}")
+    lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX if wait else fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(lock)
+        raise
+    return lock
 
 
 _reporter: CompilationReporter | None = None

@@ -10,11 +10,18 @@ from numba import types
 from numba.core import config
 from numba.extending import models, register_model
 
-from lgmd_gym.kernels.simd import call, elementwise, intrinsic, overload_operator, pointer_to
+from lgmd_gym.kernels.simd import (
+    call,
+    elementwise,
+    intrinsic,
+    overload_operator,
+    pointer_to,
+    repeated,
+    storing,
+)
 
 LANES = 8
 _DOUBLES = ir.VectorType(ir.DoubleType(), LANES)
-_FIRST = ir.Constant(ir.VectorType(ir.IntType(32), LANES), [0] * LANES)
 
 
 class Float64x8(types.Type):
@@ -45,16 +52,8 @@ def load_doubles(typingctx, array, index):
     return doubles(array, types.intp), codegen
 
 
-@intrinsic
-def store_doubles(typingctx, array, index, value):
-    """Store the lanes to eight elements of a contiguous float64 array."""
-
-    def codegen(context, builder, signature, args):
-        pointer = pointer_to(context, builder, signature.args[0], args[0], args[1], _DOUBLES)
-        builder.store(args[2], pointer).align = 8
-        return context.get_dummy_value()
-
-    return types.void(array, types.intp, doubles), codegen
+# Store the lanes to eight elements of a contiguous float64 array.
+store_doubles = storing(_DOUBLES, doubles, 8)
 
 
 @intrinsic
@@ -62,9 +61,7 @@ def splat_double(typingctx, value):
     """Return a vector with the same float64 in every lane."""
 
     def codegen(context, builder, signature, args):
-        empty = ir.Constant(_DOUBLES, ir.Undefined)
-        first = builder.insert_element(empty, args[0], ir.Constant(ir.IntType(32), 0))
-        return builder.shuffle_vector(first, empty, _FIRST)
+        return repeated(builder, _DOUBLES, args[0])
 
     return doubles(types.float64), codegen
 

@@ -9,7 +9,6 @@ have none of the three until Python calls them.
 
 import gc
 import os
-import tempfile
 from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -27,15 +26,9 @@ from numba.core.typed_passes import NativeLowering
 
 from lgmd_gym.aliases import Arguments
 from lgmd_gym.kernels.cache_folder import use_temporary_folder
-from lgmd_gym.kernels.compilation import report_compilation
+from lgmd_gym.kernels.compilation import lock_of_user, report_compilation
 from lgmd_gym.kernels.sources import source_stamp
 
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
-
-_NO_LINK = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0)
 # Versions of numba with the internals that `Kernel` uses; with any other, `kernel` is `numba.njit`.
 _KNOWN = (0, 61) <= numba.version_info.short <= (0, 68)
 
@@ -172,17 +165,14 @@ def _without_garbage_collection() -> Generator[None, None, None]:
 @contextmanager
 def _one_process() -> Generator[None, None, None]:
     """Keep the other processes of this user out of the block, where the system has such locks."""
-    file = None
+    lock = None
     with suppress(OSError):
-        path = os.path.join(tempfile.gettempdir(), f"lgmd-gym-cache-{os.getuid() if fcntl else 0}")
-        file = os.open(path, os.O_RDWR | os.O_CREAT | _NO_LINK, 0o600)
-        if fcntl is not None:
-            fcntl.flock(file, fcntl.LOCK_EX)
+        lock = lock_of_user("cache", wait=True)
     try:
         yield
     finally:
-        if file is not None:
-            os.close(file)
+        if lock is not None:
+            os.close(lock)
 
 
 class _Cache(FunctionCache):

@@ -96,16 +96,26 @@ def load(typingctx, array, index):
     return vector(array, types.intp), codegen
 
 
-@intrinsic
-def store(typingctx, array, index, value):
-    """Store the lanes to array[index : index + 16] of a float32 array."""
+def storing(kind, lanes, align):
+    """Return an intrinsic that stores the lanes of a vector to an array from an index on.
 
-    def codegen(context, builder, signature, args):
-        pointer = pointer_to(context, builder, signature.args[0], args[0], args[1], FLOATS)
-        builder.store(args[2], pointer).align = 4
-        return context.get_dummy_value()
+    `kind` is the type of the vector in LLVM, `lanes` that in numba, `align` the bytes of an element.
+    """
 
-    return types.void(array, types.intp, vector), codegen
+    @intrinsic
+    def store(typingctx, array, index, value):
+        def codegen(context, builder, signature, args):
+            pointer = pointer_to(context, builder, signature.args[0], args[0], args[1], kind)
+            builder.store(args[2], pointer).align = align
+            return context.get_dummy_value()
+
+        return types.void(array, types.intp, lanes), codegen
+
+    return store
+
+
+# Store the lanes to array[index : index + 16] of a float32 array.
+store = storing(FLOATS, vector, 4)
 
 
 def _first_lanes(builder, count):
@@ -183,15 +193,21 @@ def copy(typingctx, source, source_index, target, target_index):
     return types.void(source, types.intp, target, types.intp), codegen
 
 
+def repeated(builder, kind, value):
+    """Emit a vector of a type of LLVM with the same value in every lane."""
+    empty, index = ir.Constant(kind, ir.Undefined), ir.IntType(32)
+    first = builder.insert_element(empty, value, ir.Constant(index, 0))
+    lanes = ir.Constant(ir.VectorType(index, kind.count), [0] * kind.count)
+    return builder.shuffle_vector(first, empty, lanes)
+
+
 @intrinsic
 def splat(typingctx, value):
     """Return a vector with the same float32 or int32 in every lane."""
     kind, result = (FLOATS, vector) if value == types.float32 else (INTS, integers)
 
     def codegen(context, builder, signature, args):
-        empty = ir.Constant(kind, ir.Undefined)
-        first = builder.insert_element(empty, args[0], ir.Constant(ir.IntType(32), 0))
-        return shuffle(builder, first, empty, [0] * LANES)
+        return repeated(builder, kind, args[0])
 
     return result(types.float32 if kind is FLOATS else types.int32), codegen
 

@@ -4,6 +4,7 @@ All figures are medians of interleaved rounds in one process, on one core unless
 busy machine slows both sides of a ratio. With a file name, the rates of the engine are also plotted.
 """
 
+import argparse
 import os
 import platform
 import statistics
@@ -313,9 +314,12 @@ def rows(path=None):
 
 
 if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("picture", nargs="?", type=Path, help="PNG file of the rates to write")
+    options = parser.parse_args()
     print(f"lgmd-gym {lgmd_gym.__version__}, Python {platform.python_version()}, {platform.machine()}\n")
     print("| what | median | against |\n|---|---|---|")
-    for row in rows(*map(Path, sys.argv[1:2])):
+    for row in rows(options.picture):
         print("| " + " | ".join(row) + " |", flush=True)
     loads = ", ".join(f"{load:.1f}" for load in os.getloadavg())
     print(f"\n{os.cpu_count()} cores; load average of the last 1, 5 and 15 minutes: {loads}")

@@ -37,6 +37,7 @@ from lgmd_gym.camera.render.solids import (
     grey_of,
     outside,
     place_object,
+    place_point,
     to_axes,
 )
 from lgmd_gym.kernels import kernel
@@ -206,7 +207,7 @@ def _to_camera(lens, obj, layer, used):
     for j in range(used):
         x, y, z = _row(joints, j)
         for k in range(3):
-            joints[j, k] = axes[0, k] + x * axes[1, k] + y * axes[2, k] + z * axes[3, k]
+            joints[j, k] = place_point(axes, k, x, y, z)
 
 
 @kernel(inline=True)

@@ -84,13 +84,18 @@ def _place_polygon(lens, models, p, layer):
     return project_eight(lens, depth, right, down, models.corners_used[p], layer)
 
 
+@kernel(inline=True)
+def place_point(axes, k, a, b, c):
+    """Return coordinate k in camera axes of a point, given as fractions of an object's axes."""
+    return axes[0, k] + a * axes[1, k] + b * axes[2, k] + c * axes[3, k]
+
+
 @kernel
 def _place_face(fractions, axes, corners):
     """Place the first three corners of a face in camera axes."""
     for i in range(3):
-        a, b, c = fractions[0, i], fractions[1, i], fractions[2, i]
         for k in range(3):
-            corners[k, i] = axes[0, k] + a * axes[1, k] + b * axes[2, k] + c * axes[3, k]
+            corners[k, i] = place_point(axes, k, fractions[0, i], fractions[1, i], fractions[2, i])
 
 
 @kernel
