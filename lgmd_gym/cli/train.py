@@ -56,6 +56,9 @@ class Train:
     """Number of episodes per evaluation. Default: 96; for training on recordings, 600."""
     recordings: File = None
     """Folder of a training run on recordings with the same cameras, to reuse its recorded episodes."""
+    start: str | None = None
+    """Policy with the same inputs whose network time-to-brake starts from: a file, or a name such as all-round.
+    Default: random weights."""
     traffic_episodes: Count = None
     """Number of traffic episodes that training on recordings uses in addition.
     Default: from the hyperparameters, else 0."""
@@ -121,6 +124,7 @@ def _check_installed() -> None:
 
 def config_of(options: Train) -> "TrainConfig":
     """Return the configuration of the options of the command line."""
+    from lgmd_gym.agents.policies.policy import find_policy
     from lgmd_gym.training import TrainConfig
 
     given = map(read_camera, options.camera or ())
@@ -138,6 +142,7 @@ def config_of(options: Train) -> "TrainConfig":
         eval_freq=options.eval_freq,
         eval_episodes=options.eval_episodes,
         recordings=None if options.recordings is None else str(options.recordings.resolve()),
+        start=None if options.start is None else str(find_policy(options.start).resolve()),
         traffic_episodes=options.traffic_episodes,
         extra_levels=options.extra_levels,
         error_levels=options.error_levels,

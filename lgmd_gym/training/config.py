@@ -42,6 +42,9 @@ VALIDATION_SEED = 10_000  # first environment seed of an evaluation
 DEMANDS = {"ppo": (0.0, -1.0), "dqn": (0.0, -1.0), "sac": (), TIME_TO_BRAKE: ()}
 LEVELS_EXAMPLE = f"400:{','.join(EXTRA_FAMILIES[:2])}"
 TRAFFIC_EXAMPLE = "400:intersection,roundabout"
+_OF_RECORDINGS = (
+    *("recordings", "start", "traffic_episodes", "extra_levels", "error_levels", "extra_traffic"),
+)  # options of "time-to-brake" only
 
 
 def _check_env_kwargs(name: str, env_kwargs: object) -> Arguments:
@@ -152,6 +155,13 @@ class TrainConfig(Record):
             "Folder of a training run on recorded episodes, to reuse them; None to record anew",
         )
     )
+    start: str | None = optional(
+        text(
+            None,
+            'Policy with the same inputs whose network "time-to-brake" starts from: a file, or a name in this '
+            "package; None for random weights",
+        )
+    )
     traffic_episodes: int = whole(
         0,
         "[0, inf)",
@@ -188,7 +198,7 @@ class TrainConfig(Record):
         if self.algo == TIME_TO_BRAKE:
             _check_time_to_brake(self)
             return
-        for name in ("recordings", "traffic_episodes", "extra_levels", "error_levels", "extra_traffic"):
+        for name in _OF_RECORDINGS:
             if getattr(self, name):
                 raise ValueError(f"{name} requires algo {TIME_TO_BRAKE!r}, got {self.algo!r}; omit it")
 

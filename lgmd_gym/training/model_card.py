@@ -142,5 +142,5 @@ def _shown(config: TrainConfig) -> Values:
     return {
         name: list(cast(tuple[object, ...], value)) if isinstance(value, tuple) else value
         for name, value in values.items()
-        if name not in ("camera", "recordings")
+        if name not in ("camera", "recordings", "start")
     }

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import lgmd_gym
-from lgmd_gym.agents.policies.card import write_card
+from lgmd_gym.agents.policies.card import read_card, write_card
 from lgmd_gym.agents.policies.evidence import TimeToBrakeParams
 from lgmd_gym.agents.policies.network import describe_network
+from lgmd_gym.agents.policies.policy import Policy, find_policy
 from lgmd_gym.errors import check_keys, check_whole
 from lgmd_gym.processes.files import FolderLock, complete_file, new_folder
 from lgmd_gym.processes.inputs import read_json
@@ -24,11 +25,12 @@ from lgmd_gym.training.policy_env import PolicyWrapper
 
 if TYPE_CHECKING:
     from stable_baselines3 import PPO
+    from stable_baselines3.common.policies import BasePolicy
 
     from lgmd_gym.training.offline.time_to_brake import TimeToBrakeLearner
 
 CONFIG_FILE = "config.json"
-SET_BY_TRAINER = {"policy", "env", "seed", "device", "tensorboard_log", "verbose", "self"}
+SET_BY_TRAINER = {"policy", "env", "seed", "start", "device", "tensorboard_log", "verbose", "self"}
 """Arguments of algorithms that are not hyperparameters."""
 # Errors of stable-baselines3 and PyTorch, beside ValueError, for unsuitable hyperparameters.
 UNSUITABLE = (AssertionError, AttributeError, KeyError, RuntimeError, TypeError)
@@ -158,7 +160,8 @@ def _write_policy(config: TrainConfig, folder: Path, progress: bool, jobs: int) 
         model = train_online(config, folder, progress)
     path = folder / "policy.zip"
     network = describe_network(model)
-    values = config.to_dict() | {"recordings": None}  # a path of this machine
+    values = config.to_dict() | {"recordings": None, "start": None}  # paths of this machine
+    first = None if config.start is None else read_card(find_policy(config.start))
     card = {
         "lgmd_gym": lgmd_gym.__version__,
         "algo": type(model).__name__.lower(),  # stable-baselines3 class that reads the file
@@ -169,6 +172,7 @@ def _write_policy(config: TrainConfig, folder: Path, progress: bool, jobs: int) 
         "brake": None if brake is None else brake.to_dict(),
         "network": None if network is None else asdict(network),
         "config": values,
+        "start": None if first is None else first.get("config", {}) | {"start": first.get("start")},
         "wall_time": round(time.perf_counter() - start, 1),
     }
     with complete_file(path) as part:
@@ -225,6 +229,34 @@ def _make_learner(config: TrainConfig, env: PolicyWrapper) -> "TimeToBrakeLearne
     known = {*inspect.signature(TimeToBrakeLearner).parameters} - SET_BY_TRAINER
     check_keys(f"hyperparameter of {config.algo}", config.algo_kwargs, known)
     try:
-        return TimeToBrakeLearner(config.policy, env, seed=config.seed, **config.algo_kwargs)
+        limits = TimeToBrakeParams.make(config.algo_kwargs.get("brake")).limits_s
+        start = None if config.start is None else _start_network(config, limits)
+        return TimeToBrakeLearner(config.policy, env, seed=config.seed, start=start, **config.algo_kwargs)
     except UNSUITABLE as error:  # those of the learner itself are ValueErrors
         raise _cannot_make(config, error) from None
+
+
+def _start_network(config: TrainConfig, limits_s: tuple[float, ...]) -> "BasePolicy":
+    """Return the network of the policy that a training starts from.
+
+    Args:
+        config: Configuration with a `start`.
+        limits_s: Intervals of the time to brake of the training.
+
+    Raises:
+        ValueError: If the policy cannot be loaded, or has other inputs, cameras or intervals.
+    """
+    policy = Policy(config.start or "")
+    brake = policy.card.brake
+    pairs = {
+        "inputs": (policy.card.features, config.features),
+        "cameras": (plain_values(policy.card.camera), plain_values(config.camera)),
+        "limits_s": (None if brake is None else brake.limits_s, limits_s),
+    }
+    for name, (given, required) in pairs.items():
+        if given != required:
+            raise ValueError(
+                f"start {config.start!r} has other {name} than the training; "
+                "start from a policy of the same inputs, or omit start"
+            )
+    return policy.network

@@ -11,6 +11,7 @@ from gymnasium import spaces
 from support.recordings import write_yaml
 
 from lgmd_gym.agents import make_agent
+from lgmd_gym.agents.policies.card import read_card
 from lgmd_gym.agents.policies.features import FeatureConfig
 from lgmd_gym.statistics.ranks import roc_area
 from lgmd_gym.training import TrainConfig, train
@@ -180,6 +181,22 @@ def test_an_ensemble_learns_the_intervals_with_any_number_of_threads():
     assert logits.logits.argmax(1).tolist() == [0, 1, 2]  # 4, 15 and 36 m/s
 
 
+def test_a_training_starts_from_a_network():
+    """With a learning rate of almost 0, the odds are those of the network."""
+    first = TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=BRAKE, n_epochs=9, learning_rate=0.02)
+    start, data = first.learn(speeds(60, 0), speeds(20, 1)).policy, speeds(30, 2)
+    options = {"start": start, "n_epochs": 1, "learning_rate": 1e-9, "seed": 5}
+    learner = TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=BRAKE, **options)
+    learner.learn(speeds(60, 3), speeds(20, 1))
+    assert learner.odds(data) == pytest.approx(first.odds(data), abs=1e-3)
+    with pytest.raises(ValueError, match="start requires one network, got n_networks 2"):
+        TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=BRAKE, start=start, n_networks=2)
+    with pytest.raises(ValueError, match=r"the layers of start, .* are \[\(64, 1\), .* use its net_arch"):
+        TimeToBrakeLearner(
+            "MultiInputPolicy", Blank(), brake=BRAKE, start=start, policy_kwargs={"net_arch": {"pi": [9]}}
+        )
+
+
 def test_decisions_in_traffic_have_a_weight():
     """Nothing distinguishes both kinds of episodes: the odds are those of the weights."""
     speed, times = np.full((30, 1), 20.0, np.float32), np.zeros(30, np.float32)
@@ -262,6 +279,14 @@ def test_training_writes_a_policy_with_a_brake(tmp_path):
     assert "best_loss" in (tmp_path / "run" / "log" / "progress.csv").read_text()
     again = train(config(tmp_path, recordings=str(tmp_path / "run"), eval_episodes=2), tmp_path / "again")
     assert again.is_file()
+    options = {"recordings": str(tmp_path / "run"), "eval_episodes": 2, "seed": 1}
+    third = train(config(tmp_path, **options, start=str(again)), tmp_path / "third")
+    card = read_card(third)
+    assert (card["config"]["start"], card["config"]["seed"]) == (None, 1)  # no local path
+    assert (card["start"]["seed"], card["start"]["start"]) == (0, None)
+    assert "again" not in (tmp_path / "third" / "README.md").read_text()
+    with pytest.raises(ValueError, match="start 'all-round' has other inputs than the training"):
+        train(config(tmp_path, **options, start="all-round"), tmp_path / "fourth")
 
 
 @pytest.mark.parametrize(

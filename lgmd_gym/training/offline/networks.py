@@ -96,6 +96,23 @@ def linear_layers(network: Any) -> list[torch.nn.Linear]:
     return [*hidden, network.action_net]
 
 
+@torch.no_grad()
+def copy_layers(source: Any, target: Any) -> None:
+    """Copy the weights of a network to another one.
+
+    Raises:
+        ValueError: If their layers differ in size.
+    """
+    sizes = [[tuple(layer.weight.shape) for layer in linear_layers(item)] for item in (source, target)]
+    if sizes[0] != sizes[1]:
+        raise ValueError(
+            f"the layers of start, outputs and inputs, are {sizes[0]}, those of the training {sizes[1]}; "
+            "use its net_arch"
+        )
+    for layer, copy in zip(linear_layers(source), linear_layers(target), strict=True):
+        copy.load_state_dict(layer.state_dict())
+
+
 MIN_VARIANCE = 1e-3  # added, so that features that hardly vary are not magnified
 
 
@@ -114,6 +131,12 @@ class Standardisation(NamedTuple):
         """Change a first layer of standardised features into that of the features as they are."""
         layer.weight.mul_(self.scale)
         layer.bias.sub_(layer.weight @ self.mean)
+
+    @torch.no_grad()
+    def unfold(self, layer: torch.nn.Linear) -> None:
+        """Change a first layer of features as they are into that of standardised features."""
+        layer.bias.add_(layer.weight @ self.mean)
+        layer.weight.div_(self.scale)
 
 
 @torch.no_grad()

@@ -21,6 +21,7 @@ from lgmd_gym.training.offline.dataset import StateDataset, check_mirror
 from lgmd_gym.training.offline.networks import (
     Optimizer,
     Standardisation,
+    copy_layers,
     linear_layers,
     make_model,
     make_optimizer,
@@ -32,6 +33,7 @@ from lgmd_gym.training.offline.networks import (
 
 if TYPE_CHECKING:
     from stable_baselines3 import PPO
+    from stable_baselines3.common.policies import BasePolicy
 
 SEED_STEP = 1000  # between the seeds of the networks of an ensemble
 MEASURED_STATES = 100_000  # at most, for the standardisation of features
@@ -65,6 +67,7 @@ class TimeToBrakeLearner:
         env: Environment with the observation space of the policy; it is not stepped.
         brake: Fields of `TimeToBrakeParams`.
         seed: Seed of the network and of the order of decisions.
+        start: Network that the training starts from, with the same inputs and layers; None for random weights.
         n_networks: Number of networks of an ensemble; they are merged into one network whose logits are the
             mean.
         n_epochs: Number of passes over the training decisions.
@@ -89,6 +92,7 @@ class TimeToBrakeLearner:
         *,
         brake: Arguments | None = None,
         seed: int = 0,
+        start: "BasePolicy | None" = None,
         n_networks: int = 1,
         n_epochs: int = 6,
         batch_size: int = 1024,
@@ -117,6 +121,11 @@ class TimeToBrakeLearner:
         models = [make_model(policy, blank, seed + SEED_STEP * index, kwargs) for index in range(count)]
         self.networks: list[Any] = [model.policy for model in models]
         self.model = models[0]
+        self._continues = start is not None
+        if start is not None:
+            if count > 1:
+                raise ValueError(f"start requires one network, got n_networks {count}; use n_networks: 1")
+            copy_layers(start, self.networks[0])
         if count > 1:
             self.model = make_model(policy, blank, seed, merged_layers(kwargs, count))
 
@@ -140,6 +149,8 @@ class TimeToBrakeLearner:
             ValueError: If no epoch has a finite validation loss.
         """
         standardisation = self._measure(train)
+        if self._continues:
+            standardisation.unfold(linear_layers(self.networks[0])[0])
         steps = self.n_epochs * -(-len(train) // self.batch_size)
         optimizers = [
             make_optimizer(network, self.learning_rate, self.weight_decay, steps) for network in self.networks
