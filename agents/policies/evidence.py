@@ -31,7 +31,11 @@ class TimeToBrakeParams(StageParams):
     Action k of the policy stands for a time to brake below `limits_s[k]` and not below the limit before it;
     the last action for a longer one, or none. The log odds of a time to brake below a limit are those of the
     sum of the probabilities of the actions up to it. A threshold of 50, the upper end of the range, means
-    never: neither a margin nor extreme logits reach it.
+    never: neither a margin nor extreme logits reach it. One of -50 means always.
+
+    Partial and full braking require `confirm_odds` in addition. A network is less certain of the moment than
+    of the threat, so that two thresholds, for a short and a long time, tell threats from other road users
+    better than one.
     """
 
     label = "brake"
@@ -47,6 +51,12 @@ class TimeToBrakeParams(StageParams):
     warning_odds: float = number(0.0, ODDS, "", "Log odds for the warning.")
     present_s: float = number(2.6, "(0, inf)", "s", "The same limit for keeping a stage.")
     present_odds: float = number(-2.0, ODDS, "", "Log odds from which on a stage is kept.")
+    confirm_odds: float = number(
+        -50.0,
+        ODDS,
+        "",
+        "Log odds of the same limit that partial and full braking require in addition; -50 for no condition.",
+    )
 
     def check(self) -> None:
         """Raise ValueError for a stage at a time to brake that the policy does not distinguish."""
@@ -80,17 +90,24 @@ class TimeToBrakeParams(StageParams):
         """
         limits, thresholds = _thresholds(self)
         distance = odds[:, limits] - (thresholds + margin)
-        evidence = np.maximum.reduce((distance > 0.0) * _STAGES, axis=1)  # CLEAR is 0
+        met = distance > 0.0
+        met[:, _BRAKING] &= met[:, -1:]
+        evidence = np.maximum.reduce(met[:, :-1] * _STAGES, axis=1)  # CLEAR is 0
         return evidence, np.logical_and.reduce(np.abs(distance) > SAFE_DISTANCE, axis=1)
 
 
 _STAGES = np.array([Evidence.PRESENT, Evidence.WARNING, Evidence.PARTIAL, Evidence.FULL], np.int64)
+_BRAKING = slice(2, 4)  # those that `confirm_odds` is for
 
 
 @lru_cache(maxsize=64)  # a search for thresholds makes thousands of records
 def _thresholds(params: TimeToBrakeParams) -> tuple[np.ndarray, np.ndarray]:
-    """Return the index of the limit of each stage, int64, and its log odds, float64, infinite for never."""
+    """Return the index of the limit of each stage and of the confirmation, int64, and its log odds, float64.
+
+    Those for never and always are infinite.
+    """
     names = [Evidence(stage).name.lower() for stage in _STAGES]
-    odds: list[float] = [getattr(params, f"{name}_odds") for name in names]
-    limits = [params.limits_s.index(getattr(params, f"{name}_s")) for name in names]
-    return np.array(limits), np.array([inf if item == MAX_ODDS else item for item in odds])
+    odds: list[float] = [*(getattr(params, f"{name}_odds") for name in names), params.confirm_odds]
+    times = [*(getattr(params, f"{name}_s") for name in names), params.present_s]
+    limits = [params.limits_s.index(time) for time in times]
+    return np.array(limits), np.array([item * inf if abs(item) == MAX_ODDS else item for item in odds])

@@ -42,9 +42,8 @@ VALIDATION_SEED = 10_000  # first environment seed of an evaluation
 DEMANDS = {"ppo": (0.0, -1.0), "dqn": (0.0, -1.0), "sac": (), TIME_TO_BRAKE: ()}
 LEVELS_EXAMPLE = f"400:{','.join(EXTRA_FAMILIES[:2])}"
 TRAFFIC_EXAMPLE = "400:intersection,roundabout"
-_OF_RECORDINGS = (
-    *("recordings", "start", "traffic_episodes", "extra_levels", "error_levels", "extra_traffic"),
-)  # options of "time-to-brake" only
+# options of "time-to-brake" only
+_OF_RECORDINGS = ("recordings", "start", "traffic_episodes", "extra_levels", "error_levels", "extra_traffic")
 
 
 def _check_env_kwargs(name: str, env_kwargs: object) -> Arguments:

@@ -47,6 +47,25 @@ def test_evidence(odds, evidence):
     assert not params.evidence(np.array([[3.0005, -9.0, -9.0]]))[1][0]
 
 
+@pytest.mark.parametrize(
+    ("odds", "evidence"),
+    [
+        ([3.1, 3.1, 4.1], FULL),
+        ([3.1, 3.1, 3.9], WARNING),  # confirm_odds are 4
+        ([-9.0, 2.1, 4.1], PARTIAL),
+        ([-9.0, 2.1, 3.9], WARNING),
+        ([3.1, 3.1, -2.5], CLEAR),
+    ],
+)
+def test_braking_is_confirmed_by_the_longest_time(odds, evidence):
+    thresholds = {"full_odds": 3.0, "partial_odds": 2.0, "warning_odds": 1.0, "present_odds": -2.0}
+    params = TimeToBrakeParams.make(BRAKE | thresholds | {"confirm_odds": 4.0})
+    for margin in (0.0, 5.0):
+        found, safe = params.evidence(np.array([odds]) + margin, margin=margin)
+        assert (found[0], safe[0]) == (evidence, True)
+    assert not params.evidence(np.array([[9.0, 9.0, 4.0005]]))[1][0]
+
+
 @pytest.mark.parametrize(("partial_odds", "expected"), [(49.0, PARTIAL), (50.0, CLEAR)])
 def test_a_threshold_of_50_is_never_reached(partial_odds, expected):
     params = TimeToBrakeParams.make(BRAKE | {"partial_odds": partial_odds})

@@ -45,12 +45,14 @@ def test_file_is_small_and_contains_no_local_path():
 
 
 def test_card_matches_the_packaged_hyperparameters_and_cameras():
-    """The file all-round.yml describes the training completely."""
-    stored = read_card(find_policy("all-round"))["config"]
-    file = Path(str(files("lgmd_gym.training") / "all-round.yml"))
-    expected = TrainConfig.from_hyperparams("time-to-brake", file=file, seed=stored["seed"])
-    assert stored == json.loads(json.dumps(expected.to_dict()))
-    assert stored["camera"] == all_round_cameras()
+    """Two files describe the two trainings completely."""
+    card = read_card(find_policy("all-round"))
+    trainings = {"all-round.yml": card["start"], "all-round-2.yml": card["config"]}
+    for seed, (name, stored) in enumerate(trainings.items()):
+        file = Path(str(files("lgmd_gym.training") / name))
+        expected = TrainConfig.from_hyperparams("time-to-brake", file=file, seed=seed)
+        assert stored == json.loads(json.dumps(expected.to_dict()))
+        assert stored["camera"] == all_round_cameras()
 
 
 def test_page_states_the_thresholds_of_the_brake():
