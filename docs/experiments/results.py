@@ -7,7 +7,7 @@
 `run` plays the suites in 20 test worlds and traffic in more of them, one folder per suite; those whose folder
 exists are not run again (complete an interrupted one with `lgmd-gym bench --resume FOLDER`). With `--agents`,
 agents of your own are played in place of those of the pages. `collect` writes `docs/results/scores.csv` and
-`traffic.csv` there; with `--print`, it prints tables instead. `pages` fills every block
+`traffic.csv`, in which results of other agents and suites stay; with `--print`, it prints tables instead. `pages` fills every block
 
     <!-- table: KIND ARGUMENT … -->
     <!-- end of table -->
@@ -248,14 +248,24 @@ def drives_of(runs: dict[str, StoredRun]) -> Iterator[Drives]:
             )
 
 
-def write(path: Path, heads: Iterable[str], lines: Iterable[Iterable[object]], commit: str) -> None:
-    """Write a CSV file after a comment with the commit of the package that was run."""
+def write(path: Path, heads: Sequence[str], lines: Iterable[Iterable[object]], commit: str) -> None:
+    """Write results into a CSV file, with the commit of the package that was run.
+
+    Results of other suites or agents in the file stay.
+    """
+    suite, agent = heads.index("suite"), heads.index("agent")
+    new = [[*map(str, line), commit] for line in lines]
+    played = {(line[suite], line[agent]) for line in new}
+    old = _lines(path) if path.exists() else []
+    kept = [line for line in old if (line[suite], line[agent]) not in played]
+    rows = kept + new
+    suites, agents = list(SEEDS), [*AGENTS, *(row[agent] for row in rows)]
+    rows.sort(key=lambda row: (suites.index(row[suite]), agents.index(row[agent])))  # groups stay in order
     path.parent.mkdir(exist_ok=True)
     with complete_file(path) as part, part.open("w", newline="") as file:
-        file.write(f"# docs/experiments/results.py, commit {commit}\n")
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(heads)
-        writer.writerows(lines)
+        writer.writerow([*heads, "commit"])
+        writer.writerows(rows)
 
 
 def write_scores(scores: Iterable[Score], commit: str) -> None:
@@ -283,7 +293,7 @@ def read_scores() -> list[Score]:
     """Return the scores in the file."""
     return [
         Score(*values, Rate(int(k), int(n), float(low) / 100, float(high) / 100))  # pyright: ignore[reportCallIssue]
-        for *values, k, n, low, high in _lines(SCORES)
+        for *values, k, n, low, high, _ in _lines(SCORES)
     ]
 
 
@@ -291,7 +301,8 @@ def read_traffic() -> list[Drives]:
     """Return the results in traffic in the file."""
     types = Drives.__annotations__.values()
     return [
-        Drives(*(kind(value) for kind, value in zip(types, line, strict=True))) for line in _lines(TRAFFIC)
+        Drives(*(kind(value) for kind, value in zip(types, line, strict=True)))
+        for *line, _ in _lines(TRAFFIC)
     ]
 
 
@@ -299,7 +310,6 @@ def _lines(path: Path) -> list[list[str]]:
     if not path.exists():
         raise ValueError(f"no file {str(path)!r}; write it first with results.py collect FOLDER")
     with path.open(newline="") as file:
-        next(file)
         return list(csv.reader(file))[1:]
 
 

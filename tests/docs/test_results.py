@@ -125,7 +125,14 @@ def test_files_keep_the_scores(script, tmp_path, monkeypatch):
     script.write_scores(scores, "abc123")
     script.write_traffic(drives, "abc123")
     assert (script.read_scores(), script.read_traffic()) == (scores, drives)
-    assert "commit abc123" in script.SCORES.read_text()
+    assert script.SCORES.read_text().endswith(",abc123\n")
+    more = [item._replace(agent=agent) for agent in ("stopping-zone", "no-brake") for item in scores]
+    script.write_scores(more, "def456")
+    again = [more[1]._replace(rate=script.Rate(2, 3, 0.2, 0.9)), more[1]._replace(suite="ncap2023")]
+    script.write_scores(again, "fed789")
+    assert script.read_scores() == [again[0], more[0], *scores, again[1]]
+    commits = [line.rpartition(",")[2] for line in script.SCORES.read_text().splitlines()]
+    assert commits == ["commit", "fed789", "def456", "abc123", "fed789"]
 
 
 def test_own_agents_are_played_and_printed(script, tmp_path, monkeypatch, capsys):
