@@ -58,8 +58,9 @@ def test_card_matches_the_packaged_hyperparameters_and_cameras():
 def test_page_states_the_thresholds_of_the_brake():
     brake = read_card(find_policy("all-round"))["brake"]
     page = (Path(__file__).parents[2] / "docs" / "cards" / "all-round.md").read_text()
-    for stage in ("warning", "full"):
-        assert f"below {brake[f'{stage}_s']:g} s above {brake[f'{stage}_odds']:g} |" in page
+    assert f"below {brake['warning_s']:g} s above {brake['warning_odds']:g} |" in page
+    full = f"below {brake['full_s']:g} s above {brake['full_odds']:g}, "
+    assert full + f"and of one below {brake['present_s']:g} s above {brake['confirm_odds']:g} |" in page
     present = f"{brake['present_odds']:g}".replace("-", "\N{MINUS SIGN}")
     assert f"below {brake['present_s']:g} s at most {present} for {brake['release_s']:g} s;" in page
 

@@ -189,6 +189,13 @@ def test_a_training_starts_from_a_network():
     learner = TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=BRAKE, **options)
     learner.learn(speeds(60, 3), speeds(20, 1))
     assert learner.odds(data) == pytest.approx(first.odds(data), abs=1e-3)
+    trained = []
+    for share in (0.0, 0.5):
+        options = {"start": start, "n_epochs": 1, "learning_rate": 0.01, "start_share": share}
+        learner = TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=BRAKE, **options)
+        trained.append(learner.learn(speeds(60, 3), speeds(20, 1)).policy.action_net.weight)
+    assert torch.equal(0.5 * trained[0] + 0.5 * start.action_net.weight, trained[1])
+    assert not torch.equal(*trained)
     with pytest.raises(ValueError, match="start requires one network, got n_networks 2"):
         TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=BRAKE, start=start, n_networks=2)
     with pytest.raises(ValueError, match=r"the layers of start, .* are \[\(64, 1\), .* use its net_arch"):

@@ -96,21 +96,21 @@ def linear_layers(network: Any) -> list[torch.nn.Linear]:
     return [*hidden, network.action_net]
 
 
-@torch.no_grad()
-def copy_layers(source: Any, target: Any) -> None:
-    """Copy the weights of a network to another one.
-
-    Raises:
-        ValueError: If their layers differ in size.
-    """
-    sizes = [[tuple(layer.weight.shape) for layer in linear_layers(item)] for item in (source, target)]
-    if sizes[0] != sizes[1]:
+def check_layers(start: Any, network: Any) -> None:
+    """Raise ValueError if the layers of a network differ in size from those of the one that it starts from."""
+    given, own = ([tuple(layer.weight.shape) for layer in linear_layers(item)] for item in (start, network))
+    if given != own:
         raise ValueError(
-            f"the layers of start, outputs and inputs, are {sizes[0]}, those of the training {sizes[1]}; "
-            "use its net_arch"
+            f"the layers of start, outputs and inputs, are {given}, those of the training {own}; use its net_arch"
         )
-    for layer, copy in zip(linear_layers(source), linear_layers(target), strict=True):
-        copy.load_state_dict(layer.state_dict())
+
+
+@torch.no_grad()
+def blend_layers(start: Any, network: Any, share: float) -> None:
+    """Replace a share of the weights of a network by those of another one of the same size."""
+    for other, layer in zip(linear_layers(start), linear_layers(network), strict=True):
+        for name, weights in layer.named_parameters():
+            weights.mul_(1.0 - share).add_(share * getattr(other, name))
 
 
 MIN_VARIANCE = 1e-3  # added, so that features that hardly vary are not magnified

@@ -21,7 +21,8 @@ from lgmd_gym.training.offline.dataset import StateDataset, check_mirror
 from lgmd_gym.training.offline.networks import (
     Optimizer,
     Standardisation,
-    copy_layers,
+    blend_layers,
+    check_layers,
     linear_layers,
     make_model,
     make_optimizer,
@@ -68,6 +69,8 @@ class TimeToBrakeLearner:
         brake: Fields of `TimeToBrakeParams`.
         seed: Seed of the network and of the order of decisions.
         start: Network that the training starts from, with the same inputs and layers; None for random weights.
+        start_share: Share of `start` in the weights of the result, in [0, 1): their mean keeps more of what
+            `start` had learned from other episodes (Wortsman et al. 2022).
         n_networks: Number of networks of an ensemble; they are merged into one network whose logits are the
             mean.
         n_epochs: Number of passes over the training decisions.
@@ -93,6 +96,7 @@ class TimeToBrakeLearner:
         brake: Arguments | None = None,
         seed: int = 0,
         start: "BasePolicy | None" = None,
+        start_share: float = 0.0,
         n_networks: int = 1,
         n_epochs: int = 6,
         batch_size: int = 1024,
@@ -121,11 +125,12 @@ class TimeToBrakeLearner:
         models = [make_model(policy, blank, seed + SEED_STEP * index, kwargs) for index in range(count)]
         self.networks: list[Any] = [model.policy for model in models]
         self.model = models[0]
-        self._continues = start is not None
+        self._start, self._start_share = start, check_within("start_share", start_share, 0.0, 0.99)
         if start is not None:
             if count > 1:
                 raise ValueError(f"start requires one network, got n_networks {count}; use n_networks: 1")
-            copy_layers(start, self.networks[0])
+            check_layers(start, self.networks[0])
+            blend_layers(start, self.networks[0], 1.0)
         if count > 1:
             self.model = make_model(policy, blank, seed, merged_layers(kwargs, count))
 
@@ -149,7 +154,7 @@ class TimeToBrakeLearner:
             ValueError: If no epoch has a finite validation loss.
         """
         standardisation = self._measure(train)
-        if self._continues:
+        if self._start is not None:
             standardisation.unfold(linear_layers(self.networks[0])[0])
         steps = self.n_epochs * -(-len(train) // self.batch_size)
         optimizers = [
@@ -175,6 +180,8 @@ class TimeToBrakeLearner:
         for network, weights in zip(self.networks, best, strict=True):
             network.load_state_dict(weights)
             standardisation.fold(linear_layers(network)[0])
+        if self._start is not None:
+            blend_layers(self._start, self.networks[0], self._start_share)
         if len(self.networks) > 1:
             merge_networks(self.networks, self.model.policy)
         return self.model
