@@ -7,7 +7,8 @@
 `run` plays the suites in 20 test worlds and traffic in more of them, one folder per suite; those whose folder
 exists are not run again (complete an interrupted one with `lgmd-gym bench --resume FOLDER`). With `--agents`,
 agents of your own are played in place of those of the pages. `collect` writes `docs/results/scores.csv` and
-`traffic.csv`, in which results of other agents and suites stay; with `--print`, it prints tables instead. `pages` fills every block
+`traffic.csv`, in which results of other agents and suites stay; with `--print`, it prints tables instead.
+`pages` fills every block
 
     <!-- table: KIND ARGUMENT … -->
     <!-- end of table -->

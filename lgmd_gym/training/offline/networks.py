@@ -97,11 +97,12 @@ def linear_layers(network: Any) -> list[torch.nn.Linear]:
 
 
 def check_layers(start: Any, network: Any) -> None:
-    """Raise ValueError if the layers of a network differ in size from those of the one that it starts from."""
+    """Raise ValueError if the layers of a network differ in size from those of its start."""
     given, own = ([tuple(layer.weight.shape) for layer in linear_layers(item)] for item in (start, network))
     if given != own:
         raise ValueError(
-            f"the layers of start, outputs and inputs, are {given}, those of the training {own}; use its net_arch"
+            f"the layers of start, outputs and inputs, are {given}, those of the training {own}; "
+            "use its net_arch"
         )
 
 

@@ -68,7 +68,8 @@ class TimeToBrakeLearner:
         env: Environment with the observation space of the policy; it is not stepped.
         brake: Fields of `TimeToBrakeParams`.
         seed: Seed of the network and of the order of decisions.
-        start: Network that the training starts from, with the same inputs and layers; None for random weights.
+        start: Network that the training starts from, with the same inputs and layers; None for random
+            weights.
         start_share: Share of `start` in the weights of the result, in [0, 1): their mean keeps more of what
             `start` had learned from other episodes (Wortsman et al. 2022).
         n_networks: Number of networks of an ensemble; they are merged into one network whose logits are the
