@@ -56,7 +56,7 @@ class Train:
     """Number of episodes per evaluation. Default: 96; for training on recordings, 600."""
     recordings: File = None
     """Folder of a training run on recordings with the same cameras, to reuse its recorded episodes."""
-    start: str | None = None
+    start: Name = None
     """Policy with the same inputs whose network time-to-brake starts from: a file, or a name in this package
     such as all-round. Default: random weights."""
     traffic_episodes: Count = None

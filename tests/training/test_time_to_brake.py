@@ -196,6 +196,8 @@ def test_a_training_starts_from_a_network():
         trained.append(learner.learn(speeds(60, 3), speeds(20, 1)).policy.action_net.weight)
     assert torch.equal(0.5 * trained[0] + 0.5 * start.action_net.weight, trained[1])
     assert not torch.equal(*trained)
+    with pytest.raises(ValueError, match=r"start_share 0\.25 requires start, .*; set --start"):
+        TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=BRAKE, start_share=0.25)
     with pytest.raises(ValueError, match="start requires one network, got n_networks 2"):
         TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=BRAKE, start=start, n_networks=2)
     with pytest.raises(ValueError, match=r"the layers of start, .* are \[\(64, 1\), .* use its net_arch"):

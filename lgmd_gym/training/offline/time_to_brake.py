@@ -70,8 +70,8 @@ class TimeToBrakeLearner:
         seed: Seed of the network and of the order of decisions.
         start: Network that the training starts from, with the same inputs and layers; None for random
             weights.
-        start_share: Share of `start` in the weights of the result, in [0, 1): their mean keeps more of what
-            `start` had learned from other episodes (Wortsman et al. 2022).
+        start_share: Share of `start` in the weights of the result, in [0, 0.99]: their mean keeps more of
+            what `start` had learned from other episodes (Wortsman et al. 2022).
         n_networks: Number of networks of an ensemble; they are merged into one network whose logits are the
             mean.
         n_epochs: Number of passes over the training decisions.
@@ -127,6 +127,10 @@ class TimeToBrakeLearner:
         self.networks: list[Any] = [model.policy for model in models]
         self.model = models[0]
         self._start, self._start_share = start, check_within("start_share", start_share, 0.0, 0.99)
+        if start is None and start_share > 0.0:
+            raise ValueError(
+                f"start_share {start_share:g} requires start, the policy to start from; set --start"
+            )
         if start is not None:
             if count > 1:
                 raise ValueError(f"start requires one network, got n_networks {count}; use n_networks: 1")
