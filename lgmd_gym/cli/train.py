@@ -124,7 +124,6 @@ def _check_installed() -> None:
 
 def config_of(options: Train) -> "TrainConfig":
     """Return the configuration of the options of the command line."""
-    from lgmd_gym.agents.policies.policy import find_policy
     from lgmd_gym.training import TrainConfig
 
     given = map(read_camera, options.camera or ())
@@ -142,10 +141,17 @@ def config_of(options: Train) -> "TrainConfig":
         eval_freq=options.eval_freq,
         eval_episodes=options.eval_episodes,
         recordings=None if options.recordings is None else str(options.recordings.resolve()),
-        start=None if options.start is None else str(find_policy(options.start).resolve()),
+        start=None if options.start is None else _policy_file(options.start),
         traffic_episodes=options.traffic_episodes,
         extra_levels=options.extra_levels,
         error_levels=options.error_levels,
         extra_traffic=options.extra_traffic,
     )
     return config if options.neuron is None else config.with_neuron(options.neuron)
+
+
+def _policy_file(text: str) -> str:
+    """Return the path of a policy: a name in this package, a file, or one after "policy:" as for agents."""
+    from lgmd_gym.agents.policies.policy import find_policy
+
+    return str(find_policy(text.removeprefix("policy:")).resolve())

@@ -1,6 +1,7 @@
 """`TrainConfig`: hyperparameter files, defaults, invalid values; errors of `lgmd-gym train`."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 from support.recordings import RECORDED_YAML, recorded_config, write_yaml
 
 from lgmd_gym.agents.policies.features import FeatureConfig
+from lgmd_gym.agents.policies.policy import find_policy
 from lgmd_gym.camera import PRESETS
 from lgmd_gym.cli import main as cli
 from lgmd_gym.cli.train import Train, config_of
@@ -410,3 +412,11 @@ def test_reused_recordings_have_an_absolute_path(tmp_path, monkeypatch):
     assert config_of(Train(algo="time-to-brake", recordings=Path("other"))).recordings == str(
         tmp_path / "other"
     )
+
+
+@pytest.mark.parametrize("text", ["all-round", "policy:all-round", "own.zip", "policy:own.zip"])
+def test_start_is_a_policy_as_for_agents(tmp_path, monkeypatch, text):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(find_policy("all-round"), "own.zip")
+    expected = tmp_path / "own.zip" if "own" in text else find_policy("all-round").resolve()
+    assert config_of(Train(algo="time-to-brake", start=text)).start == str(expected)
