@@ -151,6 +151,8 @@ def _train(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path
 def _write_policy(config: TrainConfig, folder: Path, progress: bool, jobs: int) -> Path:
     start = time.perf_counter()
     brake: TimeToBrakeParams | None = None
+    # read before the training: the file may be gone after it
+    first = None if config.start is None else read_card(find_policy(config.start))
     if config.algo == TIME_TO_BRAKE:
         model = _train_on_recordings(config, folder, progress, jobs)
         brake = TimeToBrakeParams.make(config.algo_kwargs.get("brake"))
@@ -161,7 +163,6 @@ def _write_policy(config: TrainConfig, folder: Path, progress: bool, jobs: int) 
     path = folder / "policy.zip"
     network = describe_network(model)
     values = config.to_dict() | {"recordings": None, "start": None}  # paths of this machine
-    first = None if config.start is None else read_card(find_policy(config.start))
     card = {
         "lgmd_gym": lgmd_gym.__version__,
         "algo": type(model).__name__.lower(),  # stable-baselines3 class that reads the file
