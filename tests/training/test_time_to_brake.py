@@ -206,6 +206,13 @@ def test_a_training_starts_from_a_network():
         )
 
 
+def test_a_start_with_other_activations_is_refused():
+    options = {"policy_kwargs": {"activation_fn": torch.nn.Tanh}}
+    start = TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=BRAKE, **options).networks[0]
+    with pytest.raises(ValueError, match="of start are Tanh, those of the training ReLU; use its"):
+        TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=BRAKE, start=start)
+
+
 def test_decisions_in_traffic_have_a_weight():
     """Nothing distinguishes both kinds of episodes: the odds are those of the weights."""
     speed, times = np.full((30, 1), 20.0, np.float32), np.zeros(30, np.float32)

@@ -97,12 +97,18 @@ def linear_layers(network: Any) -> list[torch.nn.Linear]:
 
 
 def check_layers(start: Any, network: Any) -> None:
-    """Raise ValueError if the layers of a network differ in size from those of its start."""
+    """Raise ValueError if the layers of a network differ from those of its start."""
     given, own = ([tuple(layer.weight.shape) for layer in linear_layers(item)] for item in (start, network))
     if given != own:
         raise ValueError(
             f"the layers of start, outputs and inputs, are {given}, those of the training {own}; "
             "use its net_arch"
+        )
+    kinds = [[type(part).__name__ for part in item.mlp_extractor.policy_net] for item in (start, network)]
+    if kinds[0] != kinds[1]:
+        raise ValueError(
+            f"the activations of start are {kinds[0][1]}, those of the training {kinds[1][1]}; "
+            "use its activation_fn"
         )
 
 

@@ -71,7 +71,8 @@ class TimeToBrakeLearner:
         start: Network that the training starts from, with the same inputs and layers; None for random
             weights.
         start_share: Share of `start` in the weights of the result, in [0, 0.99]: their mean keeps more of
-            what `start` had learned from other episodes (Wortsman et al. 2022).
+            what `start` had learned from other episodes (Wortsman et al. 2022). Epochs are evaluated and
+            selected before it is added.
         n_networks: Number of networks of an ensemble; they are merged into one network whose logits are the
             mean.
         n_epochs: Number of passes over the training decisions.
