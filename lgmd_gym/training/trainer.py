@@ -258,6 +258,6 @@ def _start_network(config: TrainConfig, limits_s: tuple[float, ...]) -> "BasePol
         if given != required:
             raise ValueError(
                 f"start {config.start!r} has other {name} than the training; "
-                "start from a policy of the same inputs, or omit start"
+                f"start from a policy with the same {name}, or omit start"
             )
     return policy.network
