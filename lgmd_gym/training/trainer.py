@@ -230,34 +230,29 @@ def _make_learner(config: TrainConfig, env: PolicyWrapper) -> "TimeToBrakeLearne
     known = {*inspect.signature(TimeToBrakeLearner).parameters} - SET_BY_TRAINER
     check_keys(f"hyperparameter of {config.algo}", config.algo_kwargs, known)
     try:
-        limits = TimeToBrakeParams.make(config.algo_kwargs.get("brake")).limits_s
-        start = None if config.start is None else _start_network(config, limits)
+        start = None if config.start is None else _start_network(config.start, config)
         return TimeToBrakeLearner(config.policy, env, seed=config.seed, start=start, **config.algo_kwargs)
     except UNSUITABLE as error:  # those of the learner itself are ValueErrors
         raise _cannot_make(config, error) from None
 
 
-def _start_network(config: TrainConfig, limits_s: tuple[float, ...]) -> "BasePolicy":
+def _start_network(start: str, config: TrainConfig) -> "BasePolicy":
     """Return the network of the policy that a training starts from.
-
-    Args:
-        config: Configuration with a `start`.
-        limits_s: Intervals of the time to brake of the training.
 
     Raises:
         ValueError: If the policy cannot be loaded, or has other inputs, cameras or intervals.
     """
-    policy = Policy(config.start or "")
-    brake = policy.card.brake
+    policy = Policy(start)
+    brake, own_brake = policy.card.brake, TimeToBrakeParams.make(config.algo_kwargs.get("brake"))
     pairs = {
         "inputs": (policy.card.features, config.features),
         "cameras": (plain_values(policy.card.camera), plain_values(config.camera)),
-        "limits_s": (None if brake is None else brake.limits_s, limits_s),
+        "limits_s": (None if brake is None else brake.limits_s, own_brake.limits_s),
     }
     for name, (given, required) in pairs.items():
         if given != required:
             raise ValueError(
-                f"start {config.start!r} has other {name} than the training; "
+                f"start {start!r} has other {name} than the training; "
                 f"start from a policy with the same {name}, or omit start"
             )
     return policy.network
