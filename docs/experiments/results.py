@@ -24,7 +24,7 @@ import csv
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -311,7 +311,20 @@ def _lines(path: Path) -> list[list[str]]:
     if not path.exists():
         raise ValueError(f"no file {str(path)!r}; write it first with results.py collect FOLDER")
     with path.open(newline="") as file:
-        return list(csv.reader(file))[1:]
+        heads, *lines = csv.reader(file)
+    if heads[-1] != "commit":
+        raise ValueError(f"{str(path)!r} has another format; remove it and collect the runs of all agents")
+    return lines
+
+
+def check_twins(suites: Collection[str]) -> None:
+    """Raise ValueError for a suite without its twin: their results would come from different runs."""
+    pairs = {name: name + SUFFIX for name in SEEDS if name + SUFFIX in SEEDS}
+    for name, twin in pairs.items():
+        if (name in suites) != (twin in suites):
+            raise ValueError(
+                f"collect requires the runs of both {name!r} and {twin!r}; play the other one, too"
+            )
 
 
 def table(
@@ -454,6 +467,7 @@ def main() -> None:
             print(*table(measure, suites, scores, drives), "", sep="\n")
         print(*traffic_table(drives), sep="\n")
         return
+    check_twins(runs)
     git = ["git", "rev-parse", "--short", "HEAD"]
     commit = subprocess.run(git, capture_output=True, text=True, check=True).stdout.strip()
     write_scores(scores, commit)

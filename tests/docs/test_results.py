@@ -133,6 +133,16 @@ def test_files_keep_the_scores(script, tmp_path, monkeypatch):
     assert script.read_scores() == [again[0], more[0], *scores, again[1]]
     commits = [line.rpartition(",")[2] for line in script.SCORES.read_text().splitlines()]
     assert commits == ["commit", "fed789", "def456", "abc123", "fed789"]
+    script.SCORES.write_text("# docs/experiments/results.py, commit abc123\nsuite\nr152\n")
+    with pytest.raises(ValueError, match=r"scores.csv' has another format; remove it and collect"):
+        script.write_scores(scores, "abc123")
+
+
+def test_a_suite_is_collected_with_its_twin(script):
+    script.check_twins(["r152", "ncap2023", "ncap2023-without-target"])
+    for alone in ("ncap2023", "ncap2023-without-target"):
+        with pytest.raises(ValueError, match="both 'ncap2023' and 'ncap2023-without-target'; play the other"):
+            script.check_twins([alone])
 
 
 def test_own_agents_are_played_and_printed(script, tmp_path, monkeypatch, capsys):
