@@ -40,8 +40,12 @@ print(agent.agent.card)
 
 ## Training
 
-```yaml
+{start}```yaml
 {config}```
+"""
+_START = """It starts from the network of another policy, which this folder does not contain. The card in the file has
+its training as `start`.
+
 """
 
 
@@ -83,6 +87,7 @@ def write_model_card(config: TrainConfig, folder: Path, version: str) -> None:
         version=version,
         inputs=", ".join(f"`{name}`" for name in config.features.inputs),
         evaluation=text,
+        start="" if config.start is None else _START,
         config=yaml.safe_dump(_shown(config), sort_keys=False),
     )
     metadata = yaml.safe_dump(_metadata(config, result), sort_keys=False)

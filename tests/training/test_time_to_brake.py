@@ -300,7 +300,10 @@ def test_training_writes_a_policy_with_a_brake(tmp_path):
     card = read_card(third)
     assert (card["config"]["start"], card["config"]["seed"]) == (None, 1)  # no local path
     assert (card["start"]["seed"], card["start"]["start"]) == (0, None)
-    assert "again" not in (tmp_path / "third" / "README.md").read_text()
+    page = (tmp_path / "third" / "README.md").read_text()
+    assert "It starts from the network of another policy" in page
+    assert "again" not in page
+    assert "starts from" not in (tmp_path / "again" / "README.md").read_text()
     with pytest.raises(ValueError, match="start 'all-round' has other inputs than the training"):
         train(config(tmp_path, **options, start="all-round"), tmp_path / "fourth")
 
