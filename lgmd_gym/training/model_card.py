@@ -43,8 +43,8 @@ print(agent.agent.card)
 {start}```yaml
 {config}```
 """
-_START = """It starts from the network of another policy, which this folder does not contain. The card in the file has
-its training as `start`.
+_START = """It starts from the network of another policy, which this folder does not contain. The card in the
+file has its training as `start`.
 
 """
 
