@@ -36,6 +36,9 @@ class TimeToBrakeParams(StageParams):
     Partial and full braking require `confirm_odds` in addition. A network is less certain of the moment than
     of the threat, so that two thresholds, for a short and a long time, tell threats from other road users
     better than one.
+
+    While the driver brakes, partial and full braking require `driver_odds` more of both. The driver has seen
+    the road user, and the time to brake is that of an ego that holds its speed.
     """
 
     label = "brake"
@@ -65,6 +68,16 @@ class TimeToBrakeParams(StageParams):
                 limits = ", ".join(f"{limit:g}" for limit in self.limits_s)
                 raise ValueError(f"{name} must be one of limits_s, {limits}, got {getattr(self, name):g}")
 
+    driver_odds: float = number(
+        0.0,
+        "[0, 50]",
+        "",
+        "Log odds added to the thresholds of partial and full braking while the driver brakes.",
+    )
+    driver_deceleration: float = number(
+        2.0, "(0, inf)", "m/s²", "Deceleration without braking by the agent from which on the driver brakes."
+    )
+
     @property
     def num_actions(self) -> int:
         """Number of actions of the policy."""
@@ -81,15 +94,20 @@ class TimeToBrakeParams(StageParams):
         above = np.logaddexp.accumulate(values[:, ::-1], axis=1)[:, ::-1][:, 1:]
         return below - above
 
-    def evidence(self, odds: np.ndarray, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    def evidence(
+        self, odds: np.ndarray, margin: float = 0.0, driver_brakes: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the `Evidence` of log odds, int64, shape (N,), and whether it is far from every threshold.
 
         Args:
             odds: Log odds, see `odds`.
             margin: Added to the thresholds of all stages but those of 50, which are never reached.
+            driver_brakes: Whether the driver brakes, bool, shape (N,); None for no.
         """
         limits, thresholds = _thresholds(self)
         distance = odds[:, limits] - (thresholds + margin)
+        if driver_brakes is not None:
+            distance[:, _BRAKING.start :] -= self.driver_odds * driver_brakes[:, None]
         met = distance > 0.0
         met[:, _BRAKING] &= met[:, -1:]
         evidence = np.maximum.reduce(met[:, :-1] * _STAGES, axis=1)  # CLEAR is 0
@@ -97,7 +115,7 @@ class TimeToBrakeParams(StageParams):
 
 
 _STAGES = np.array([Evidence.PRESENT, Evidence.WARNING, Evidence.PARTIAL, Evidence.FULL], np.int64)
-_BRAKING = slice(2, 4)  # those that `confirm_odds` is for
+_BRAKING = slice(2, 4)  # those that `confirm_odds`, which comes behind them, and `driver_odds` are for
 
 
 @lru_cache(maxsize=64)  # a search for thresholds makes thousands of records

@@ -243,20 +243,29 @@ class Policy(StagedAgent):
         self._inputs.update(observations, rows)
         due = rows[decisions[rows] % self.features.repeat == 0]
         if len(due):
-            evidence[due] = self._judge(self._inputs.stack(due))
+            evidence[due] = self._judge(self._inputs.stack(due), self._driver_brakes(observations)[due])
         decisions[rows] += 1
         return evidence
 
-    def _judge(self, inputs: dict[str, np.ndarray]) -> np.ndarray:
+    def _driver_brakes(self, observations: Observations) -> np.ndarray:
+        """Return whether the ego decelerates without braking by the agent, bool, shape (N,)."""
+        brake = self.card.brake
+        assert brake is not None
+        if brake.driver_odds == 0.0:
+            return np.zeros(self.num_envs, np.bool_)
+        decelerates = observations["ego_acceleration"][:, 0] <= -brake.driver_deceleration
+        return decelerates & (self.state["stage"] < Evidence.PARTIAL)
+
+    def _judge(self, inputs: dict[str, np.ndarray], driver_brakes: np.ndarray) -> np.ndarray:
         """Return the evidence for the inputs of several environments, arrays of shape (M, …)."""
         brake, logits = self.card.brake, self._values(inputs)
         assert brake is not None
         assert logits is not None  # the card was compared with the network
-        evidence, safe = brake.evidence(brake.odds(logits), self._margin)
+        evidence, safe = brake.evidence(brake.odds(logits), self._margin, driver_brakes)
         if len(evidence) > 1 and not self._independent:
             for row in np.flatnonzero(~safe).tolist():  # see `SAFE_DISTANCE`
                 alone = {name: values[row : row + 1] for name, values in inputs.items()}
-                evidence[row] = self._judge(alone)[0]
+                evidence[row] = self._judge(alone, driver_brakes[row : row + 1])[0]
         return evidence
 
     def decide(self, inputs: dict[str, np.ndarray]) -> list[float]:

@@ -54,6 +54,24 @@ def test_evidence(confirm_odds, odds, evidence):
     assert near == (confirm_odds == -50.0)  # there is no distance from a condition that is always met
 
 
+def test_a_driver_who_brakes_raises_the_thresholds_of_braking():
+    thresholds = {"full_odds": 3.0, "partial_odds": 2.0, "warning_odds": 1.0, "confirm_odds": 4.0}
+    params = TimeToBrakeParams.make(BRAKE | thresholds | {"driver_odds": 1.5})
+    brakes = np.array([False, True, True, True, True, True])
+    odds = [
+        [3.1, 3.1, 4.1],
+        [4.4, 3.4, 9.0],
+        [4.4, 3.6, 9.0],
+        [4.6, 4.6, 5.4],
+        [4.6, 4.6, 5.6],
+        [0.0, 0.0, 1.1],
+    ]
+    found, safe = params.evidence(np.array(odds), 0.0, brakes)
+    assert found.tolist() == [FULL, WARNING, PARTIAL, WARNING, FULL, WARNING]
+    assert safe.all()
+    assert not params.evidence(np.array([[4.5005, 9.0, 9.0]]), 0.0, np.array([True]))[1][0]
+
+
 @pytest.mark.parametrize(("partial_odds", "expected"), [(49.0, PARTIAL), (50.0, CLEAR)])
 def test_a_threshold_of_50_is_never_reached(partial_odds, expected):
     params = TimeToBrakeParams.make(BRAKE | {"partial_odds": partial_odds})
@@ -100,6 +118,7 @@ def policy(tmp_path):
         model.policy.action_net.bias[:] = torch.tensor([-5.0, -30.0, -30.0, 0.0])
     model.save(tmp_path / "policy.zip")
     brake = BRAKE | {"full_odds": 1.0, "warning_odds": -1.0, "present_odds": -2.0, "release_s": 0.1}
+    brake |= {"driver_odds": 1.0, "driver_deceleration": 2.5}
     features = {"inputs": ["ego_speed"], "history": 1, "repeat": 2}
     card = PolicyCard(
         algo="ppo", camera="fovea", brake=brake, features=features, network=describe_network(model)
@@ -113,8 +132,9 @@ def test_a_policy_warns_brakes_and_releases(policy):
     log_odds = [-5.0, -5.0, -0.5, -0.5, 1.5, 1.5, -1.5, -1.5, *[-3.0] * 6]
     found, alerts = [], []
     for value in log_odds:
-        speed = 20.0 * (value + 5.0) / 10.0
-        demands = agent.act({"ego_speed": np.array([[speed], [2.0]], np.float32)}, {})
+        speeds = np.array([[20.0 * (value + 5.0) / 10.0], [2.0]], np.float32)
+        accelerations = np.array([[-9.0 if found and found[-1] else 0.0], [0.0]], np.float32)
+        demands = agent.act({"ego_speed": speeds, "ego_acceleration": accelerations}, {})
         found.append(float(demands[0]))
         alerts.append(bool(agent.alerts[0]))
         assert demands[1] == 0.0  # log odds of -4
@@ -125,7 +145,20 @@ def test_a_policy_warns_brakes_and_releases(policy):
 
 def test_a_margin_moves_all_stages(policy):
     observation = {"ego_speed": np.full((1, 1), 20.0 * 6.5 / 10.0, np.float32)}  # log odds of 1.5
+    observation["ego_acceleration"] = np.full((1, 1), -2.4, np.float32)
     assert make_agents(policy, 1).act(observation, {}) == [-1.0]
     later = make_agents(f"{policy}:margin=1", 1)
     assert later.act(observation, {}) == [0.0]
     assert later.alerts == [True]
+
+
+def test_a_policy_leaves_braking_to_the_driver_unless_it_is_surer(policy):
+    agent = make_agents(policy, 3)
+    log_odds, accelerations = np.array([1.5, 1.5, 2.5]), np.array([-2.4, -2.6, -2.6])
+    observation = {"ego_speed": np.float32(2.0 * (log_odds + 5.0))[:, None]}
+    observation["ego_acceleration"] = np.float32(accelerations)[:, None]
+    assert agent.act(observation, {}).tolist() == [-1.0, 0.0, -1.0]
+    assert agent.alerts.all()
+    for _ in range(4):  # the agent's own braking is not that of the driver
+        observation["ego_acceleration"] = np.full((3, 1), -9.0, np.float32)
+        assert agent.act(observation, {}).tolist() == [-1.0, 0.0, -1.0]

@@ -36,6 +36,8 @@ def test_decisions_of_many_episodes_are_in_their_order():
     for name in ("features", "classes", "braking", "in_traffic"):
         assert np.array_equal(getattr(data, name), np.concatenate([getattr(item, name) for item in single]))
     assert data.features.shape == (sum(map(len, single)), 2)
+    assert np.diff(data.bounds).tolist() == [len(item) for item in single]
+    assert np.array_equal(data.times, np.concatenate([item.time_to_brake[::2] for item in episodes]))
 
 
 def test_a_lower_decision_rate_uses_every_third_decision():

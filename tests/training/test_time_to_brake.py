@@ -237,6 +237,30 @@ def test_decisions_in_traffic_have_a_weight():
     assert losses[-1] == pytest.approx(-0.25 * np.log(0.25) - 0.75 * np.log(0.75), abs=0.03)
 
 
+def test_the_loss_of_episodes_makes_the_brake_act_in_time():
+    """Half of the decisions before a threat look like those of safe episodes, which are three times as many.
+
+    The cross-entropy alone never brakes at such decisions. The brake need act at one of a threat only.
+    """
+    rng, made = np.random.default_rng(0), []
+    for index in range(80):
+        threat = index % 4 == 0
+        speed = rng.choice([10.0, 20.0] if threat else [10.0], (10, 1)).astype(np.float32)
+        times = np.arange(10, 0, -1) / 10.0 - 0.2 if threat else np.full(10, np.inf)
+        made.append(DrivenEpisode({"ego_speed": speed}, times.astype(np.float32), np.zeros(10), threat))
+    dataset = StateDataset(made, FeatureConfig(inputs=("ego_speed",), history=1, repeat=1), BRAKE["limits_s"])
+    losses, brake = [], BRAKE | {"confirm_odds": 1.0}
+    for weight in (0.0, 3.0):
+        options = {"episode_weight": weight, "n_epochs": 40, "batch_size": 100, "learning_rate": 0.01}
+        learner = TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=brake, dropout=0.0, **options)
+        epochs = []
+        learner.learn(dataset, dataset, lambda _, metrics, found=epochs: found.append(metrics))
+        last = epochs[-1]
+        losses.append(last["episode_loss"])
+        assert last["loss"] >= weight * last["episode_loss"]
+    assert losses[1] < 0.6 * losses[0]
+
+
 def test_training_in_bfloat16_differs_by_rounding():
     weights = []
     for rounded, jobs in ((False, 1), (True, 1), (True, 2)):
@@ -318,6 +342,10 @@ def test_training_writes_a_policy_with_a_brake(tmp_path):
         (
             {"text": YAML.replace("n_epochs: 2", "traffic_weight: 0")},
             r"traffic_weight must be in \[0.01, 100\], got 0",
+        ),
+        (
+            {"text": YAML.replace("n_epochs: 2", "episode_weight: -1")},
+            r"episode_weight must be in \[0, 100\], got -1",
         ),
         ({"text": YAML.replace("n_epochs: 2", "bfloat16: 1")}, "bfloat16 must be true or false, got 1"),
         ({"text": YAML.replace("history: 1", "history: 2")}, "requires history: 1"),

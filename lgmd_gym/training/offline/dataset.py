@@ -55,7 +55,9 @@ class StateDataset:
         names: Names of the inputs, in the order of the network: sorted.
         sizes: Number of features of each input.
         features: Inputs side by side, float16, (M, features).
-        classes: Index of the interval, int64, (M,).
+        bounds: Index of the first decision of each episode, and M, int64, (episodes + 1,).
+        times: Time to brake, float32, (M,) [s].
+        classes: Index of its interval, int64, (M,).
         braking: Whether the agent braked before the decision, bool, (M,).
         in_traffic: Whether the episode is one of traffic, bool, (M,).
     """
@@ -80,7 +82,9 @@ class StateDataset:
                 np.full(-(-len(episode) // features.repeat), episode.family == TRAFFIC) for episode in group
             ]
         self.features = rows.array()
-        self.classes = np.digitize(np.concatenate(times), limits_s)
+        self.bounds = np.cumsum([0, *map(len, times)])
+        self.times = np.concatenate(times)
+        self.classes = np.digitize(self.times, limits_s)
         self.braking = np.concatenate(demands) < HOLD
         self.in_traffic = np.concatenate(in_traffic)
 

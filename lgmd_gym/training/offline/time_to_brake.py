@@ -2,7 +2,7 @@
 # Not strict: torch and stable-baselines3 state few types.
 """`TimeToBrakeLearner`: a policy that estimates the time to brake at the decisions of driven episodes."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,6 +18,7 @@ from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import check_flag, check_positive, check_whole, check_within
 from lgmd_gym.statistics.ranks import roc_area
 from lgmd_gym.training.offline.dataset import StateDataset, check_mirror
+from lgmd_gym.training.offline.episode_loss import EpisodeTarget, episode_loss, find_targets
 from lgmd_gym.training.offline.networks import (
     Optimizer,
     Standardisation,
@@ -44,10 +45,19 @@ EVALUATED_STATES = 4096  # at once
 class StateEvaluation(NamedTuple):
     """Results on the decisions of the validation episodes."""
 
-    loss: float  # weighted mean of the cross-entropy
+    loss: float  # weighted mean of the cross-entropy, plus `episode_weight` times `episode_loss`
+    episode_loss: float  # see `lgmd_gym.training.offline.episode_loss`
     # areas under the ROC curve for the time to brake below the limit of full braking
     area: float  # of all decisions
     area_braking: float  # of those under braking; NaN without both outcomes
+
+
+class _Batch(NamedTuple):
+    """Decisions of a gradient step."""
+
+    indices: np.ndarray  # int64
+    lengths: list[int]  # number of decisions of each whole episode; none for decisions of any episodes
+    targets: list[EpisodeTarget]  # of these episodes
 
 
 class _Spaces(gym.Env[Any, Any]):
@@ -61,7 +71,7 @@ class TimeToBrakeLearner:
     """Trains a stable-baselines3 policy whose actions are intervals of the time to brake.
 
     It minimises the cross-entropy over the decisions of driven episodes, which are shuffled, see
-    `lgmd_gym.training.offline.driving`.
+    `lgmd_gym.training.offline.driving`, and on request a loss of whole episodes in addition.
 
     Args:
         policy: stable-baselines3's name of the network.
@@ -82,6 +92,8 @@ class TimeToBrakeLearner:
         dropout: Share of the hidden units that are left out in each gradient step.
         mirror: Whether each decision is mirrored, left to right, with probability 1/2 in each pass.
         traffic_weight: Weight of a decision in traffic, in [0.01, 100]; one in a level has weight 1.
+        episode_weight: Weight of the loss of whole episodes, in [0, 100], see
+            `lgmd_gym.training.offline.episode_loss`. Above 0, episodes are shuffled in place of decisions.
         bfloat16: Whether matrix products are in bfloat16, which saves time on CPUs with instructions for it
             (AVX-512 BF16) and takes longer than float32 on others.
         policy_kwargs: Further arguments of the network.
@@ -107,6 +119,7 @@ class TimeToBrakeLearner:
         dropout: float = 0.3,
         mirror: bool = True,
         traffic_weight: float = 1.0,
+        episode_weight: float = 0.0,
         bfloat16: bool = False,
         policy_kwargs: Arguments | None = None,
     ) -> None:
@@ -118,6 +131,7 @@ class TimeToBrakeLearner:
         self.dropout = check_within("dropout", dropout, 0.0, 0.9)
         self.mirror = check_flag("mirror", mirror)
         self.traffic_weight = check_within("traffic_weight", traffic_weight, 0.01, 100.0)
+        self.episode_weight = check_within("episode_weight", episode_weight, 0.0, 100.0)
         self.bfloat16 = check_flag("bfloat16", bfloat16)
         self._seed, count = seed, check_whole("n_networks", n_networks, 1)
         given: Any = env.observation_space
@@ -162,7 +176,7 @@ class TimeToBrakeLearner:
         standardisation = self._measure(train)
         if self._start is not None:
             standardisation.unfold(linear_layers(self.networks[0])[0])
-        steps = self.n_epochs * -(-len(train) // self.batch_size)
+        steps = self.n_epochs * self._num_batches(train)
         optimizers = [
             make_optimizer(network, self.learning_rate, self.weight_decay, steps) for network in self.networks
         ]
@@ -171,9 +185,13 @@ class TimeToBrakeLearner:
             torch.Generator().manual_seed(self._seed + index) for index in range(len(self.networks))
         ]
         rng, lowest, best = np.random.default_rng(self._seed), np.inf, list[Any]()
+        targets = find_targets(train, self.brake) if self.episode_weight else []
         with ThreadPoolExecutor(check_whole("jobs", jobs, 1)) as executor:
             for epoch in range(1, self.n_epochs + 1):
-                loss = self._train_epoch(train, standardisation, optimizers, generators, rng, executor)
+                batches = self._batches(train, targets, rng)
+                loss = self._train_epoch(
+                    train, batches, standardisation, optimizers, generators, rng, executor
+                )
                 found = self.evaluate(validation, standardisation)
                 if found.loss < lowest:
                     lowest, best = found.loss, [_copy(network) for network in self.networks]
@@ -200,11 +218,15 @@ class TimeToBrakeLearner:
                 for part in np.array_split(np.arange(len(dataset)), -(-len(dataset) // EVALUATED_STATES))
             ]
         )
+        lengths, targets = np.diff(dataset.bounds).tolist(), find_targets(dataset, self.brake)
+        of_episodes = float(episode_loss(torch.from_numpy(logits), lengths, targets, self.brake))
         limit = self.brake.limits_s.index(self.brake.full_s)
         due, odds, braking = dataset.classes <= limit, self.brake.odds(logits)[:, limit], dataset.braking
         losses = cross_entropy(torch.from_numpy(logits), torch.from_numpy(dataset.classes), reduction="none")
+        loss = float(np.average(losses.numpy(), weights=self._weights(dataset.in_traffic)))
         return StateEvaluation(
-            float(np.average(losses.numpy(), weights=self._weights(dataset.in_traffic))),
+            loss + self.episode_weight * of_episodes,
+            of_episodes,
             roc_area(odds[due], odds[~due]),
             roc_area(odds[due & braking], odds[~due & braking]),
         )
@@ -233,6 +255,7 @@ class TimeToBrakeLearner:
     def _train_epoch(
         self,
         train: StateDataset,
+        batches: Iterator[_Batch],
         standardisation: Standardisation,
         optimizers: Sequence[Optimizer],
         generators: Sequence[torch.Generator],
@@ -242,7 +265,7 @@ class TimeToBrakeLearner:
         """Train on each decision once, and return the mean loss."""
         losses, weights = list[float](), list[float]()
         running = list[Future[float]]()
-        for indices in np.array_split(rng.permutation(len(train)), -(-len(train) // self.batch_size)):
+        for indices, lengths, targets in batches:
             # This thread prepares a batch while others take the step before.
             mirrored = rng.random(len(indices)) < 0.5 if self.mirror else None
             features = standardisation.apply(train.batch(indices, mirrored))
@@ -253,6 +276,7 @@ class TimeToBrakeLearner:
                 classes=torch.from_numpy(train.classes[indices]),
                 weights=torch.from_numpy(given),
                 dropout=self.dropout,
+                further_loss=partial(self._episode_loss, lengths=lengths, targets=targets),
             )
             losses += _mean_loss(running)
             running = [
@@ -261,6 +285,33 @@ class TimeToBrakeLearner:
             ]
             weights.append(float(given.sum()))
         return float(np.average(losses + _mean_loss(running), weights=weights))
+
+    def _num_batches(self, train: StateDataset) -> int:
+        """Return the number of gradient steps of an epoch."""
+        count = -(-len(train) // self.batch_size)
+        return min(count, len(train.bounds) - 1) if self.episode_weight else count
+
+    def _batches(
+        self, train: StateDataset, targets: list[EpisodeTarget], rng: np.random.Generator
+    ) -> Iterator[_Batch]:
+        """Yield the batches of an epoch: random decisions, or all of random episodes."""
+        count, bounds = self._num_batches(train), train.bounds
+        if not self.episode_weight:
+            for indices in np.array_split(rng.permutation(len(train)), count):
+                yield _Batch(indices, [], [])
+            return
+        for episodes in np.array_split(rng.permutation(len(bounds) - 1), count):
+            parts = [np.arange(bounds[index], bounds[index + 1]) for index in episodes]
+            chosen = [targets[index] for index in episodes]
+            yield _Batch(np.concatenate(parts), [len(part) for part in parts], chosen)
+
+    def _episode_loss(
+        self, logits: torch.Tensor, lengths: list[int], targets: list[EpisodeTarget]
+    ) -> torch.Tensor | float:
+        """Return the weighted loss of the whole episodes of a batch."""
+        if not lengths:
+            return 0.0
+        return self.episode_weight * episode_loss(logits, lengths, targets, self.brake)
 
     def _weights(self, in_traffic: np.ndarray) -> np.ndarray:
         """Return the weights of decisions, float32, (M,)."""
@@ -275,6 +326,7 @@ def _update(
     classes: torch.Tensor,
     weights: torch.Tensor,
     dropout: float,
+    further_loss: Callable[[torch.Tensor], torch.Tensor | float],
 ) -> float:
     """Take one gradient step of a network and return its loss before it."""
     hidden = features
@@ -285,6 +337,7 @@ def _update(
                 hidden = leave_out(hidden, dropout, generator)
         logits = network.action_net(hidden).float()
     loss = (cross_entropy(logits, classes, reduction="none") * weights).sum() / weights.sum()
+    loss = loss + further_loss(logits)
     optimizer.step(loss)
     return float(loss.detach())
 
