@@ -1,4 +1,4 @@
-"""Loss of whole episodes: targets, margins of the brake, and the smooth maximum."""
+"""Loss of whole episodes: targets, log odds of braking, and the smooth maximum."""
 
 from math import inf
 
@@ -12,7 +12,7 @@ from lgmd_gym.agents.stages import Evidence
 from lgmd_gym.training.offline.dataset import StateDataset
 from lgmd_gym.training.offline.episode_loss import (
     EpisodeTarget,
-    braking_margins,
+    braking_odds,
     episode_loss,
     find_targets,
 )
@@ -56,25 +56,27 @@ def test_targets():
     ]
 
 
-def test_margins_are_those_of_the_evidence():
+def test_the_brake_acts_where_the_log_odds_exceed_its_threshold():
     logits = np.random.default_rng(0).normal(0.0, 2.0, (500, 5)).astype(np.float32)
     for brake in (BRAKE, TimeToBrakeParams(full_s=0.6, full_odds=-0.2)):
         evidence, _ = brake.evidence(brake.odds(logits))
-        margins = braking_margins(torch.from_numpy(logits), brake).numpy()
-        assert np.array_equal(margins > 0.0, evidence == Evidence.FULL)
-        assert 50 < (margins > 0.0).sum() < 450
+        acts = braking_odds(torch.from_numpy(logits), brake).numpy() > brake.full_odds
+        assert np.array_equal(acts, evidence == Evidence.FULL)
+        assert 50 < acts.sum() < 450
 
 
-def test_the_loss_is_that_of_the_highest_margin():
+def test_the_loss_is_that_of_the_highest_log_odds():
     logits = torch.randn(9, 5, generator=torch.Generator().manual_seed(0), requires_grad=True)
-    margins = braking_margins(logits.detach(), BRAKE).numpy()
+    odds = braking_odds(logits.detach(), BRAKE).numpy()
     empty = EpisodeTarget(np.arange(0), -1.0)
     targets = [EpisodeTarget(np.arange(4), 1.0), empty, EpisodeTarget(np.array([1, 2]), -1.0)]
     loss = episode_loss(logits, [4, 2, 3], targets, BRAKE)
-    smooth = [np.log(np.exp(3.0 * part).sum()) / 3.0 for part in (margins[:4], margins[7:9])]
-    assert smooth[0] == pytest.approx(margins[:4].max(), abs=np.log(4.0) / 3.0)
+    smooth = [np.log(np.exp(3.0 * part).sum()) / 3.0 for part in (odds[:4], odds[7:9])]
+    assert smooth[0] == pytest.approx(odds[:4].max(), abs=np.log(4.0) / 3.0)
     expected = np.mean([np.log1p(np.exp(smooth[0])), np.log1p(np.exp(-smooth[1]))])
     assert loss.item() == pytest.approx(expected, rel=1e-5)
     loss.backward()
     assert logits.grad[4:7].abs().max() == 0.0  # decisions that do not count
-    assert float(episode_loss(logits, [9], [empty], BRAKE)) == 0.0
+    assert episode_loss(logits, [9], [empty], BRAKE).item() == 0.0
+    raised = TimeToBrakeParams(full_s=1.2, full_odds=1.3, confirm_odds=1.8)
+    assert episode_loss(logits, [4, 2, 3], targets, raised).item() == pytest.approx(expected, rel=1e-5)

@@ -4,7 +4,7 @@
 
 A benchmark asks once per episode whether the brake acts. The cross-entropy asks at every decision how long it
 can wait, and most of these questions are easy. This loss asks that of the benchmark: it is the logistic loss
-of the highest margin over the thresholds of full braking in an episode.
+of the highest log odds of full braking in an episode.
 """
 
 from collections.abc import Iterable, Sequence
@@ -58,24 +58,27 @@ def episode_loss(
         logits: Logits of the decisions of whole episodes, one after the other, float32, (M, actions).
         lengths: Number of decisions of each episode.
         targets: Target of each episode.
-        brake: Thresholds of full braking.
+        brake: See `braking_odds`.
     """
+    parts = braking_odds(logits, brake).split(list(lengths))
     losses = [
-        softplus(target.sign * torch.logsumexp(SHARPNESS * margins[target.decisions], 0) / SHARPNESS)
-        for margins, target in zip(braking_margins(logits, brake).split(list(lengths)), targets, strict=True)
+        softplus(target.sign * torch.logsumexp(SHARPNESS * odds[target.decisions], 0) / SHARPNESS)
+        for odds, target in zip(parts, targets, strict=True)
         if len(target.decisions)
     ]
     return torch.stack(losses).mean() if losses else logits.new_zeros(())
 
 
-def braking_margins(logits: torch.Tensor, brake: TimeToBrakeParams) -> torch.Tensor:
-    """Return the margin over the thresholds of full braking, the smaller one of both, (M,).
+def braking_odds(logits: torch.Tensor, brake: TimeToBrakeParams) -> torch.Tensor:
+    """Return log odds that exceed `full_odds` where the brake acts fully, (M,).
 
-    It is that of `TimeToBrakeParams.evidence`, differentiable.
+    They are the smaller ones of those of both conditions, with the second threshold raised or lowered to the
+    first one. So they depend on the difference of the thresholds only: these can be chosen after a training.
     """
     below, above = logits.logcumsumexp(1)[:, :-1], logits.flip(1).logcumsumexp(1).flip(1)[:, 1:]
     odds = below - above
-    margins = odds[:, brake.limits_s.index(brake.full_s)] - brake.full_odds
+    full = odds[:, brake.limits_s.index(brake.full_s)]
     if brake.confirm_odds == -MAX_ODDS:
-        return margins
-    return torch.minimum(margins, odds[:, brake.limits_s.index(brake.present_s)] - brake.confirm_odds)
+        return full
+    present = odds[:, brake.limits_s.index(brake.present_s)]
+    return torch.minimum(full, present - (brake.confirm_odds - brake.full_odds))
