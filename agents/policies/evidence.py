@@ -61,13 +61,6 @@ class TimeToBrakeParams(StageParams):
         "Log odds of the same limit that partial and full braking require in addition; -50 for no condition.",
     )
 
-    def check(self) -> None:
-        """Raise ValueError for a stage at a time to brake that the policy does not distinguish."""
-        for name in ("full_s", "partial_s", "warning_s", "present_s"):
-            if getattr(self, name) not in self.limits_s:
-                limits = ", ".join(f"{limit:g}" for limit in self.limits_s)
-                raise ValueError(f"{name} must be one of limits_s, {limits}, got {getattr(self, name):g}")
-
     driver_odds: float = number(
         0.0,
         "[0, 50]",
@@ -77,6 +70,13 @@ class TimeToBrakeParams(StageParams):
     driver_deceleration: float = number(
         2.0, "(0, inf)", "m/s²", "Deceleration without braking by the agent from which on the driver brakes."
     )
+
+    def check(self) -> None:
+        """Raise ValueError for a stage at a time to brake that the policy does not distinguish."""
+        for name in ("full_s", "partial_s", "warning_s", "present_s"):
+            if getattr(self, name) not in self.limits_s:
+                limits = ", ".join(f"{limit:g}" for limit in self.limits_s)
+                raise ValueError(f"{name} must be one of limits_s, {limits}, got {getattr(self, name):g}")
 
     @property
     def num_actions(self) -> int:

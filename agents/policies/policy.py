@@ -3,12 +3,13 @@
 import copy
 from collections.abc import Sequence
 from functools import partial
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from lgmd_gym.agents.base import Infos, Observations, StagedAgent, State
+from lgmd_gym.agents.base import FPS, Infos, Observations, StagedAgent, State
 from lgmd_gym.agents.policies.card import PolicyCard, policy_card
 from lgmd_gym.agents.policies.features import (
     FRAME,
@@ -36,6 +37,8 @@ MAX_MARGIN = 20.0  # of log odds; the sensible range is about -4 to 4
 # The outputs of a network that torch runs depend on the size of the batch, because the order of float32 sums
 # does. The differences are near 1e-6. A lead of the best action beyond this limit does not depend on them.
 SAFE_LEAD = 1e-3
+FADE_S = 0.5  # time for which the car decelerates after the demand of the agent ended
+DRIVER_HOLD_S = 0.3  # time for which a driver counts as braking: the deceleration may fluctuate
 
 
 class PolicyInputs(Protocol):
@@ -208,8 +211,9 @@ class Policy(StagedAgent):
         return any(name not in NOT_NEURONS for name in self.features.inputs)
 
     def initial(self) -> State:
-        """Return a released brake and the number of decisions."""
-        return super().initial() | {"demand": 0.0, "decisions": 0, "evidence": int(Evidence.CLEAR)}
+        """Return a released brake, the number of decisions, and times since agent and driver braked."""
+        times = {"braked_s": inf, "driver_s": inf}
+        return super().initial() | {"demand": 0.0, "decisions": 0, "evidence": int(Evidence.CLEAR)} | times
 
     def reset(
         self, mask: np.ndarray | None = None, seeds: Sequence[int | None] | np.ndarray | None = None
@@ -241,20 +245,31 @@ class Policy(StagedAgent):
         """Return new evidence at every `repeat`-th call, else the last one."""
         evidence, decisions, rows = self.state["evidence"], self.state["decisions"], np.flatnonzero(active)
         self._inputs.update(observations, rows)
-        due = rows[decisions[rows] % self.features.repeat == 0]
-        if len(due):
-            evidence[due] = self._judge(self._inputs.stack(due), self._driver_brakes(observations)[due])
+        driver_brakes = self._driver_brakes(observations, rows)
+        is_due = decisions[rows] % self.features.repeat == 0
+        if is_due.any():
+            due = rows[is_due]
+            evidence[due] = self._judge(self._inputs.stack(due), driver_brakes[is_due])
         decisions[rows] += 1
         return evidence
 
-    def _driver_brakes(self, observations: Observations) -> np.ndarray:
-        """Return whether the ego decelerates without braking by the agent, bool, shape (N,)."""
+    def _driver_brakes(self, observations: Observations, rows: np.ndarray) -> np.ndarray:
+        """Return whether the drivers of some environments brake, bool, shape (M,); once per decision.
+
+        They do if the ego decelerates, up to 0.3 s after that, but not during braking by the agent and 0.5 s
+        after it, when the brake still fades.
+        """
         brake = self.card.brake
         assert brake is not None
         if brake.driver_odds == 0.0:
-            return np.zeros(self.num_envs, np.bool_)
-        decelerates = observations["ego_acceleration"][:, 0] <= -brake.driver_deceleration
-        return decelerates & (self.state["stage"] < Evidence.PARTIAL)
+            return np.zeros(len(rows), np.bool_)
+        braked_s, driver_s = (self.state[name][rows] + 1.0 / FPS for name in ("braked_s", "driver_s"))
+        braked_s[self.state["stage"][rows] >= Evidence.PARTIAL] = 0.0
+        decelerates = observations["ego_acceleration"][rows, 0] <= -brake.driver_deceleration
+        driver_s[decelerates] = 0.0
+        driver_s[braked_s <= FADE_S] = inf
+        self.state["braked_s"][rows], self.state["driver_s"][rows] = braked_s, driver_s
+        return driver_s <= DRIVER_HOLD_S
 
     def _judge(self, inputs: dict[str, np.ndarray], driver_brakes: np.ndarray) -> np.ndarray:
         """Return the evidence for the inputs of several environments, arrays of shape (M, …)."""

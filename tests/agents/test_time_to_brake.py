@@ -152,13 +152,44 @@ def test_a_margin_moves_all_stages(policy):
     assert later.alerts == [True]
 
 
+def drive(agent, log_odds, accelerations):
+    """Return the demands of one decision."""
+    speeds = np.float32(2.0 * (np.array(log_odds) + 5.0))[:, None]
+    return agent.act(
+        {"ego_speed": speeds, "ego_acceleration": np.float32(accelerations)[:, None]}, {}
+    ).tolist()
+
+
 def test_a_policy_leaves_braking_to_the_driver_unless_it_is_surer(policy):
-    agent = make_agents(policy, 3)
-    log_odds, accelerations = np.array([1.5, 1.5, 2.5]), np.array([-2.4, -2.6, -2.6])
-    observation = {"ego_speed": np.float32(2.0 * (log_odds + 5.0))[:, None]}
-    observation["ego_acceleration"] = np.float32(accelerations)[:, None]
-    assert agent.act(observation, {}).tolist() == [-1.0, 0.0, -1.0]
-    assert agent.alerts.all()
-    for _ in range(4):  # the agent's own braking is not that of the driver
-        observation["ego_acceleration"] = np.full((3, 1), -9.0, np.float32)
-        assert agent.act(observation, {}).tolist() == [-1.0, 0.0, -1.0]
+    agent = make_agents(policy, 4)
+    for _ in range(4):
+        assert drive(agent, [1.5, 1.5, 1.5, 2.5], [-2.4, -2.5, -2.6, -2.6]) == [-1.0, 0.0, 0.0, -1.0]
+        assert agent.alerts.all()
+    # The driver counts as braking for 0.3 s after the deceleration, nine decisions.
+    found = [drive(agent, [1.5] * 4, [0.0] * 4)[1] for _ in range(12)]
+    assert found.index(-1.0) in (9, 10)  # the policy decides every second time
+    agent.reset(np.array([False, True, False, False]))
+    assert drive(agent, [1.5] * 4, [0.0] * 4)[1] == -1.0
+
+
+def test_the_fading_brake_of_the_agent_is_not_that_of_the_driver(policy):
+    """The agent brakes, releases, and brakes again while the car still decelerates."""
+    agent = make_agents(policy, 1)
+    log_odds = [1.5] * 4 + [-3.0] * 6 + [1.5] * 4
+    demands = [drive(agent, [value], [-9.0 if index else 0.0])[0] for index, value in enumerate(log_odds)]
+    assert demands == [-1.0] * 6 + [0.0] * 4 + [-1.0] * 4
+    agent.reset()
+    log_odds = [1.5] * 4 + [-3.0] * 24 + [1.5] * 4  # a deceleration that lasts is that of the driver
+    demands = [drive(agent, [value], [-9.0 if index else 0.0])[0] for index, value in enumerate(log_odds)]
+    assert demands == [-1.0] * 6 + [0.0] * 26
+
+
+def test_only_the_environments_of_a_decision_are_those_of_its_drivers(policy):
+    """Inactive environments, and those whose decision is not due, keep their evidence."""
+    agent, active = make_agents(policy, 3), np.array([False, True, True])
+    observation = {
+        "ego_speed": np.full((3, 1), 13.0, np.float32),  # log odds of 1.5
+        "ego_acceleration": np.float32([[0.0], [-3.0], [0.0]]),
+    }
+    demands = agent.act(observation, {}, active)
+    assert demands[1:].tolist() == [0.0, -1.0]

@@ -57,12 +57,17 @@ def test_card_matches_the_packaged_hyperparameters_and_cameras():
 
 def test_page_states_the_thresholds_of_the_brake():
     brake = read_card(find_policy("all-round"))["brake"]
+    text = {
+        name: f"{value:g}".replace("-", "\N{MINUS SIGN}")
+        for name, value in brake.items()
+        if name != "limits_s"
+    }
     page = (Path(__file__).parents[2] / "docs" / "cards" / "all-round.md").read_text()
-    assert f"below {brake['warning_s']:g} s above {brake['warning_odds']:g} |" in page
-    full = f"below {brake['full_s']:g} s above {brake['full_odds']:g}, "
-    assert full + f"and of one below {brake['present_s']:g} s above {brake['confirm_odds']:g} |" in page
-    present = f"{brake['present_odds']:g}".replace("-", "\N{MINUS SIGN}")
-    assert f"below {brake['present_s']:g} s at most {present} for {brake['release_s']:g} s;" in page
+    assert "below {warning_s} s above {warning_odds} |".format(**text) in page
+    full = "below {full_s} s above {full_odds}, and of one below {present_s} s above {confirm_odds} |"
+    assert full.format(**text) in page
+    assert "by {driver_deceleration} m/s² or more | {driver_odds} more".format(**text) in page
+    assert "below {present_s} s at most {present_odds} for {release_s} s;".format(**text) in page
 
 
 @pytest.mark.parametrize("scenario", ["CCRs", "EmptyRoad"])
