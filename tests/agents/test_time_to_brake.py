@@ -184,12 +184,15 @@ def test_the_fading_brake_of_the_agent_is_not_that_of_the_driver(policy):
     assert demands == [-1.0] * 6 + [0.0] * 26
 
 
-def test_only_the_environments_of_a_decision_are_those_of_its_drivers(policy):
-    """Inactive environments, and those whose decision is not due, keep their evidence."""
-    agent, active = make_agents(policy, 3), np.array([False, True, True])
+def test_drivers_are_those_of_the_environments_that_decide(policy):
+    agent = make_agents(policy, 2)
     observation = {
-        "ego_speed": np.full((3, 1), 13.0, np.float32),  # log odds of 1.5
-        "ego_acceleration": np.float32([[0.0], [-3.0], [0.0]]),
+        "ego_speed": np.full((2, 1), 13.0, np.float32),  # log odds of 1.5
+        "ego_acceleration": np.float32([[0.0], [-3.0]]),
     }
-    demands = agent.act(observation, {}, active)
-    assert demands[1:].tolist() == [0.0, -1.0]
+    assert agent.act(observation, {}, np.array([True, False]))[0] == -1.0
+    assert agent.act(observation, {}).tolist() == [-1.0, 0.0]  # the second one decides
+    agent.reset()
+    agent._independent = False  # log odds near a threshold are calculated for each environment by itself
+    observation["ego_speed"][:] = 2.0 * (1.9995 + 5.0)
+    assert agent.act(observation, {}).tolist() == [-1.0, 0.0]

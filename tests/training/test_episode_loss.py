@@ -44,6 +44,9 @@ def test_targets():
         ([inf] * 4, [0.0] * 4),
         ([inf] * 4, [0.0, -0.5, 0.0, 0.0]),
         ([0.0, 0.0], [0.0, 0.0]),  # always too late
+        ([2.6, 2.5, 0.3], [0.0, 0.0, 0.0]),
+        ([2.6, 2.5, 0.5, 0.4], [0.0, 0.0, 0.0, -1.0]),  # the demand of the last decision has no effect on it
+        ([2.6, 2.5, 0.5, 0.4, 0.2], [0.0, 0.0, 0.0, -1.0, -1.0]),
     )
     found = [(target.decisions.tolist(), target.sign) for target in find_targets(data, BRAKE)]
     assert found == [
@@ -52,6 +55,9 @@ def test_targets():
         ([], -1.0),
         ([0, 1, 2, 3], 1.0),
         ([0, 1], 1.0),
+        ([], -1.0),
+        ([1, 2], -1.0),
+        ([], -1.0),
         ([], -1.0),
     ]
 

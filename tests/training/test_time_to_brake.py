@@ -18,6 +18,7 @@ from lgmd_gym.training import TrainConfig, train
 from lgmd_gym.training.offline.dataset import StateDataset
 from lgmd_gym.training.offline.driving import NUM_ENVS, DriveRecorder, PulseDriver
 from lgmd_gym.training.offline.episodes import DrivenEpisode, load, record_parallel, save
+from lgmd_gym.training.offline.networks import Standardisation
 from lgmd_gym.training.offline.time_to_brake import TimeToBrakeLearner, leave_out
 
 ARGUMENTS = {"camera": "fovea", "families": ["CCRs", "EmptyRoad"], "world": "laboratory"}
@@ -249,16 +250,21 @@ def test_the_loss_of_episodes_makes_the_brake_act_in_time():
         times = np.arange(10, 0, -1) / 10.0 - 0.2 if threat else np.full(10, np.inf)
         made.append(DrivenEpisode({"ego_speed": speed}, times.astype(np.float32), np.zeros(10), threat))
     dataset = StateDataset(made, FeatureConfig(inputs=("ego_speed",), history=1, repeat=1), BRAKE["limits_s"])
-    losses, brake = [], BRAKE | {"confirm_odds": 1.0}
-    for weight in (0.0, 3.0):
+    losses, weights, brake = [], [], BRAKE | {"confirm_odds": 1.0}
+    for weight in (0.0, 1e-6, 3.0):
         options = {"episode_weight": weight, "n_epochs": 40, "batch_size": 100, "learning_rate": 0.01}
         learner = TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=brake, dropout=0.0, **options)
         epochs = []
         learner.learn(dataset, dataset, lambda _, metrics, found=epochs: found.append(metrics))
-        last = epochs[-1]
-        losses.append(last["episode_loss"])
-        assert last["loss"] >= weight * last["episode_loss"]
-    assert losses[1] < 0.6 * losses[0]
+        losses.append(epochs[-1]["episode_loss"])
+        found = []
+        for learner.episode_weight in (0.0, 2.5):
+            found.append(learner.evaluate(dataset, Standardisation(torch.zeros(1), torch.ones(1))))
+        assert found[0].episode_loss == found[1].episode_loss > 0.0
+        assert found[1].loss - found[0].loss == pytest.approx(2.5 * found[0].episode_loss, rel=1e-6)
+        weights.append(learner.model.policy.action_net.weight)
+    assert losses[2] < 0.6 * min(losses[:2])
+    assert not torch.equal(weights[1], weights[2])
 
 
 def test_training_in_bfloat16_differs_by_rounding():

@@ -4,7 +4,7 @@
 
 A benchmark asks once per episode whether the brake acts. The cross-entropy asks at every decision how long it
 can wait, and most of these questions are easy. This loss asks that of the benchmark: it is the logistic loss
-of the highest log odds of full braking in an episode.
+of the highest log odds of full braking in an episode, as a smooth maximum.
 """
 
 from collections.abc import Iterable, Sequence
@@ -17,7 +17,8 @@ from torch.nn.functional import softplus
 from lgmd_gym.agents.policies.evidence import MAX_ODDS, TimeToBrakeParams
 from lgmd_gym.training.offline.dataset import StateDataset
 
-SHARPNESS = 3.0  # of the smooth maximum log(Σ exp(3 m)) / 3
+# Of the smooth maximum log(Σ exp(3 m)) / 3. It exceeds the maximum, by log(T) / 3 if T log odds are equal.
+SHARPNESS = 3.0
 
 
 class EpisodeTarget(NamedTuple):
@@ -31,10 +32,10 @@ class EpisodeTarget(NamedTuple):
 def find_targets(dataset: StateDataset, brake: TimeToBrakeParams) -> list[EpisodeTarget]:
     """Return the target of every episode.
 
-    Only decisions before the first braking of the recorded driver count. Without a threat, the brake should
+    Only decisions before the first braking of the recorded agent count. Without a threat, the brake should
     act at none of them. With one, it should act at one with a time to brake above 0 and below `present_s`. An
-    episode with a threat has no target if its driver brakes while the time to brake is above the first limit:
-    a brake that waits is right as well.
+    episode with a threat has no target if the agent brakes while the time to brake is above the first limit,
+    because a brake that waits is right as well.
     """
     targets: list[EpisodeTarget] = []
     for first, last in zip(dataset.bounds[:-1].tolist(), dataset.bounds[1:].tolist(), strict=True):
@@ -70,7 +71,7 @@ def episode_loss(
 
 
 def braking_odds(logits: torch.Tensor, brake: TimeToBrakeParams) -> torch.Tensor:
-    """Return log odds that exceed `full_odds` where the brake acts fully, (M,).
+    """Return log odds that exceed `full_odds` where the brake acts fully if the driver does not brake, (M,).
 
     They are the smaller ones of those of both conditions, with the second threshold raised or lowered to the
     first one. So they depend on the difference of the thresholds only: these can be chosen after a training.

@@ -86,7 +86,7 @@ class TimeToBrakeLearner:
         n_networks: Number of networks of an ensemble; they are merged into one network whose logits are the
             mean.
         n_epochs: Number of passes over the training decisions.
-        batch_size: Number of decisions per gradient step.
+        batch_size: Number of decisions per gradient step; their mean number with `episode_weight`.
         learning_rate: Maximum of the one-cycle schedule (Smith & Topin 2018).
         weight_decay: Weight decay of AdamW.
         dropout: Share of the hidden units that are left out in each gradient step.
