@@ -295,14 +295,15 @@ class TimeToBrakeLearner:
         self, train: StateDataset, targets: list[EpisodeTarget], rng: np.random.Generator
     ) -> Iterator[_Batch]:
         """Yield the batches of an epoch: random decisions, or all of random episodes."""
-        count, bounds = self._num_batches(train), train.bounds
+        count, bounds = self._num_batches(train), train.bounds.tolist()
         if not self.episode_weight:
             for indices in np.array_split(rng.permutation(len(train)), count):
                 yield _Batch(indices, [], [])
             return
         for episodes in np.array_split(rng.permutation(len(bounds) - 1), count):
-            parts = [np.arange(bounds[index], bounds[index + 1]) for index in episodes]
-            chosen = [targets[index] for index in episodes]
+            numbers = episodes.tolist()
+            parts = [np.arange(bounds[index], bounds[index + 1]) for index in numbers]
+            chosen = [targets[index] for index in numbers]
             yield _Batch(np.concatenate(parts), [len(part) for part in parts], chosen)
 
     def _episode_loss(
