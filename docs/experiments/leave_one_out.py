@@ -60,14 +60,13 @@ class Levels:
     Attributes:
         dataset: The decisions.
         levels: The episodes.
-        bounds: First decision of each episode, and the number of decisions.
     """
 
     def __init__(
         self, episodes: Iterator[DrivenEpisode], config: TrainConfig, limits_s: Sequence[float]
     ) -> None:
         self.levels: list[Level] = []
-        lengths, repeat = [0], config.features.repeat
+        repeat = config.features.repeat
 
         def noted() -> Iterator[DrivenEpisode]:
             for episode in episodes:
@@ -75,28 +74,24 @@ class Levels:
                 times = episode.time_to_brake[: braking[0] + 1 if braking.size else None]
                 waits = bool((times <= LATE_S).any())
                 self.levels.append(Level(episode.family, episode.threat, times[::repeat] > 0.0, waits))
-                lengths.append(-(-len(episode) // repeat))
                 yield episode
 
         self.dataset = StateDataset(noted(), config.features, limits_s)
-        self.bounds = np.cumsum(lengths)
 
     def part(self, chosen: Sequence[int]) -> "Part":
         """Return the decisions of some episodes."""
-        return Part(self.dataset, self.decisions(chosen))
-
-    def decisions(self, chosen: Sequence[int]) -> np.ndarray:
-        """Return the indices of the decisions of some episodes."""
-        return np.concatenate([np.arange(*self.bounds[index : index + 2]) for index in chosen])
+        return Part(self.dataset, chosen)
 
 
 class Part:
-    """Some decisions of a `StateDataset`, which is not copied."""
+    """Some episodes of a `StateDataset`, which is not copied."""
 
-    def __init__(self, dataset: StateDataset, indices: np.ndarray) -> None:
-        self._dataset, self._indices = dataset, indices
-        self.classes, self.braking = dataset.classes[indices], dataset.braking[indices]
-        self.in_traffic = dataset.in_traffic[indices]
+    def __init__(self, dataset: StateDataset, episodes: Sequence[int]) -> None:
+        parts = [np.arange(*dataset.bounds[index : index + 2]) for index in episodes]
+        self._dataset, self._indices = dataset, np.concatenate(parts)
+        self.bounds = np.cumsum([0, *map(len, parts)])
+        self.times, self.classes = dataset.times[self._indices], dataset.classes[self._indices]
+        self.braking, self.in_traffic = dataset.braking[self._indices], dataset.in_traffic[self._indices]
 
     def __len__(self) -> int:
         return len(self._indices)
@@ -108,13 +103,13 @@ class Part:
 
 def highest_odds(learner: TimeToBrakeLearner, source: Levels, chosen: Sequence[int]) -> np.ndarray:
     """Return the highest log odds of full braking in each level; of a threat, while it is in time."""
-    indices = source.decisions(chosen)
+    counts = np.diff(source.dataset.bounds)[list(chosen)]
     limit = learner.brake.limits_s.index(learner.brake.full_s)
     parts: list[Any] = [
-        Part(source.dataset, part) for part in np.array_split(indices, -(-len(indices) // EVALUATED_STATES))
+        Part(source.dataset, part.tolist())
+        for part in np.array_split(list(chosen), min(-(-counts.sum() // EVALUATED_STATES), len(chosen)))
     ]
     odds = np.concatenate([learner.odds(part)[:, limit] for part in parts])
-    counts = np.diff(source.bounds)[list(chosen)]
     found: list[float] = []
     for index, (first, last) in zip(chosen, pairwise(np.cumsum([0, *counts])), strict=True):
         level = source.levels[index]
