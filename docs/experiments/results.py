@@ -382,13 +382,13 @@ def summary_table(scores: Sequence[Score], drives: Sequence[Drives]) -> list[str
     """Return the table of the start page."""
     rates = {(score.agent, score.suite, score.measure): score.rate for score in scores if score.group == ALL}
     needless = {item.agent: item for item in drives if item.suite == "traffic"}
-    lines = [["agent", "idea", *SUMMARY, "needless brakes per 1,000 km of traffic", "reads"]]
+    lines = [["agent", "idea", *SUMMARY, "needless brakes in traffic", "reads"]]
     for agent, (idea, reads) in IDEAS.items():
         columns = [rates.get((agent, *column)) for column in SUMMARY.values()]
         cells = [f"{rate.k} of {rate.n}" if rate else "–" for rate in columns]
         drive = needless.get(agent)
-        rate = f"{1000 * drive.needless / drive.km:.0f}" if drive else "–"
-        lines.append([f"`{agent}`", idea, *cells, rate, reads])
+        cells.append(f"{drive.needless} in {drive.km:.0f} km" if drive else "–")
+        lines.append([f"`{agent}`", idea, *cells, reads])
     return markdown(lines)
 
 

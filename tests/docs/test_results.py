@@ -113,7 +113,7 @@ def test_the_table_of_the_start_page_has_a_line_per_idea(script):
     assert len(lines) == len(script.IDEAS)
     assert len({line.count("|") for line in (heads, *lines)}) == 1
     assert lines[1].startswith("| `stopping-zone` | fields that follow the stopping distance | 3 of 4 |")
-    assert " | 20 | 17 LGMDs" in lines[1]
+    assert " | 4 in 200 km | 17 LGMDs" in lines[1]
     assert " | – | " in lines[0]
 
 
