@@ -60,7 +60,6 @@ class TimeToBrakeParams(StageParams):
         "",
         "Log odds of the same limit that partial and full braking require in addition; -50 for no condition.",
     )
-
     driver_odds: float = number(
         0.0,
         "[0, 50]",
@@ -68,7 +67,7 @@ class TimeToBrakeParams(StageParams):
         "Log odds added to the thresholds of partial and full braking while the driver brakes.",
     )
     driver_deceleration: float = number(
-        2.0, "(0, inf)", "m/s²", "Deceleration without braking by the agent from which on the driver brakes."
+        2.0, "(0, inf)", "m/s²", "Deceleration from which on the driver brakes, unless the agent does."
     )
 
     def check(self) -> None:

@@ -37,8 +37,8 @@ MAX_MARGIN = 20.0  # of log odds; the sensible range is about -4 to 4
 # The outputs of a network that torch runs depend on the size of the batch, because the order of float32 sums
 # does. The differences are near 1e-6. A lead of the best action beyond this limit does not depend on them.
 SAFE_LEAD = 1e-3
-FADE_S = 0.5  # time for which the car decelerates after the demand of the agent ended
-DRIVER_HOLD_S = 0.3  # time for which a driver counts as braking: the deceleration may fluctuate
+FADE_S = 0.5  # time for which the car may decelerate after the agent released the brake
+DRIVER_HOLD_S = 0.3  # time for which a braking driver counts as such: decelerations fluctuate
 
 
 class PolicyInputs(Protocol):
