@@ -12,7 +12,7 @@ import lgmd_gym
 from lgmd_gym.agents.policies.card import read_card, write_card
 from lgmd_gym.agents.policies.evidence import TimeToBrakeParams
 from lgmd_gym.agents.policies.network import describe_network
-from lgmd_gym.agents.policies.policy import Policy, find_policy
+from lgmd_gym.agents.policies.policy import find_policy
 from lgmd_gym.errors import check_keys, check_whole
 from lgmd_gym.processes.files import FolderLock, complete_file, new_folder
 from lgmd_gym.processes.inputs import read_json
@@ -25,7 +25,6 @@ from lgmd_gym.training.policy_env import PolicyWrapper
 
 if TYPE_CHECKING:
     from stable_baselines3 import PPO
-    from stable_baselines3.common.policies import BasePolicy
 
     from lgmd_gym.training.offline.time_to_brake import TimeToBrakeLearner
 
@@ -225,34 +224,16 @@ def _make_learner(config: TrainConfig, env: PolicyWrapper) -> "TimeToBrakeLearne
     Raises:
         ValueError: For an unknown hyperparameter, one out of range, or a network that cannot be made.
     """
+    from lgmd_gym.training.offline.start import load_start
     from lgmd_gym.training.offline.time_to_brake import TimeToBrakeLearner
 
     known = {*inspect.signature(TimeToBrakeLearner).parameters} - SET_BY_TRAINER
     check_keys(f"hyperparameter of {config.algo}", config.algo_kwargs, known)
     try:
-        start = None if config.start is None else _start_network(config.start, config)
+        start = None
+        if config.start is not None:
+            brake = TimeToBrakeParams.make(config.algo_kwargs.get("brake"))
+            start = load_start(config.start, config.features, config.camera, brake)
         return TimeToBrakeLearner(config.policy, env, seed=config.seed, start=start, **config.algo_kwargs)
     except UNSUITABLE as error:  # those of the learner itself are ValueErrors
         raise _cannot_make(config, error) from None
-
-
-def _start_network(start: str, config: TrainConfig) -> "BasePolicy":
-    """Return the network of the policy that a training starts from.
-
-    Raises:
-        ValueError: If the policy cannot be loaded, or has other inputs, cameras or intervals.
-    """
-    policy = Policy(start)
-    brake, own_brake = policy.card.brake, TimeToBrakeParams.make(config.algo_kwargs.get("brake"))
-    pairs = {
-        "inputs": (policy.card.features, config.features),
-        "cameras": (plain_values(policy.card.camera), plain_values(config.camera)),
-        "limits_s": (None if brake is None else brake.limits_s, own_brake.limits_s),
-    }
-    for name, (given, required) in pairs.items():
-        if given != required:
-            raise ValueError(
-                f"start {start!r} has other {name} than the training; "
-                f"start from a policy with the same {name}, or omit start"
-            )
-    return policy.network
