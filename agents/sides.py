@@ -5,6 +5,7 @@ from typing import NamedTuple
 from lgmd_gym.agents.zones import (
     CONTRAST_S,
     DRY_DECELERATION,
+    LOW_ZONES,
     REACHES,
     REACTION,
     SPAN_M,
@@ -13,11 +14,15 @@ from lgmd_gym.agents.zones import (
 from lgmd_gym.aliases import Values
 
 # The forward fields are those of `stopping-zone` at twice the width, because a pedestrian on collision course
-# is beside the ego's lane until the last second; every other zone of them, and one beyond them for warnings.
+# is beside the ego's lane until the last second: all low fields, and the others for every other zone and one
+# beyond them for warnings.
 FORWARD_WIDTH_PX, FORWARD_SPAN_M, FORWARD_COLUMNS = 160, 2.0 * SPAN_M, 10
-FORWARD_KINDS = ("ground", "upright")
-FORWARD_REACHES = (*REACHES[::2], 2.5)
-NUM_FORWARD_FIELDS = len(FORWARD_KINDS) * len(FORWARD_REACHES)
+FORWARD_REACHES = {
+    "ground": (*REACHES[::2], 2.5),
+    "upright": (*REACHES[::2], 2.5),
+    "low": tuple(REACHES[zone] for zone in LOW_ZONES),
+}
+NUM_FORWARD_FIELDS = sum(len(reaches) for reaches in FORWARD_REACHES.values())
 FORWARD_NEURON = "dsn"
 NEURONS = ("dsn", "edges")  # at the sides
 SIDE_WIDTH_PX, SIDE_COLUMNS = 80, 5
@@ -48,15 +53,15 @@ NUM_COLUMNS = NUM_FORWARD_COLUMNS + NUM_SIDE_FIELDS * len(NEURONS) * SIDE_COLUMN
 
 
 def forward_cameras() -> list[Values]:
-    """Return the channels of the path: five ground fields and five upright fields, nearest first.
+    """Return the channels of the path: five ground, five upright and three low fields, nearest first each.
 
     They have ten columns of 0.48 m at the far end. Their stopping distance follows the car's estimate of its
     full braking.
     """
     cameras = [
         zone_camera(kind, reach, DRY_DECELERATION, REACTION)
-        for kind in FORWARD_KINDS
-        for reach in FORWARD_REACHES
+        for kind, reaches in FORWARD_REACHES.items()
+        for reach in reaches
     ]
     return [
         {

@@ -138,9 +138,11 @@ def threshold_of(odds: np.ndarray) -> float:
 
 
 def make_learner(config: TrainConfig, epochs: int) -> TimeToBrakeLearner:
-    """Return a learner of one network."""
+    """Return a learner of one network with random weights: a start may have been trained on every family."""
     env = config.make_policy_env("train")
-    recipe: Any = config.algo_kwargs | {"n_networks": 1, "n_epochs": epochs}
+    recipe: Any = config.algo_kwargs | {"n_networks": 1, "n_epochs": epochs, "start_share": 0.0}
+    if config.start is not None:
+        recipe |= {"learning_rate": 0.004, "batch_size": 1024}  # those of the folder continue a training
     env.close()
     return TimeToBrakeLearner(config.policy, env, seed=config.seed, **recipe)
 

@@ -73,6 +73,8 @@ SIDE_DETECTORS = ("lgmd", *NEURONS)
 FILE = Path(str(files("lgmd_gym.training") / "all-round.yml"))
 CONFIG = TrainConfig.from_hyperparams("time-to-brake", file=FILE)
 """Training of `policy:all-round`."""
+FROM_RANDOM = {"learning_rate": 0.004, "batch_size": 1024, "start_share": 0.0, "episode_weight": 0.0}
+"""Changes for a training that starts from random weights."""
 FILE_SIZE = 50  # levels
 
 
@@ -296,7 +298,7 @@ def train(train_set: FieldDataset, selection: FieldDataset, seed: int, epochs: i
     sizes = zip(train_set.names, train_set.sizes, strict=True)
     boxes: Any = {name: spaces.Box(-CLIP, CLIP, (size,), np.float32) for name, size in sizes}
     env: Any = SimpleNamespace(observation_space=spaces.Dict(boxes))
-    recipe: Any = CONFIG.algo_kwargs | {"n_networks": 1, "n_epochs": epochs, "bfloat16": False}
+    recipe: Any = CONFIG.algo_kwargs | FROM_RANDOM | {"n_epochs": epochs, "bfloat16": False}
     learner = TimeToBrakeLearner(CONFIG.policy, env, seed=seed, **recipe)
     learner.learn(train_set, selection)
     return learner

@@ -74,7 +74,7 @@ ALL = "all"
 IDEAS = {
     "spike-threshold": ("the paper's rule: brake at 30 spikes/s", "one LGMD, a fixed 10° camera"),
     "stopping-zone": ("fields that follow the stopping distance", "17 LGMDs, speed, yaw rate"),
-    "policy:all-round": ("a network that estimates the time to brake", "16 fields, speed, motion, brake"),
+    "policy:all-round": ("a network that estimates the time to brake", "19 fields, speed, motion, brake"),
     BOUND: ("the bound: brakes at the last moment", "the true scene"),
 }
 """Idea of an agent, and what it reads."""

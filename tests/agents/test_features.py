@@ -153,7 +153,7 @@ def test_features_of_columns_have_the_sign_of_the_motion():
 def test_features_of_mean_strengths_at_the_sides():
     strengths = np.linspace(0.0, 9.0, NUM_ALL_ROUND)
     features = stack(zone_history("sides_ffi"), {"ffi": strengths})["sides_ffi"].reshape(4, -1)
-    expected = np.log1p(2.0 * strengths[10:16]) / 3.4  # after those of 5 + 5 forward fields
+    expected = np.log1p(2.0 * strengths[13:19]) / 3.4  # after those of 5 + 5 + 3 forward fields
     assert features[0] == pytest.approx(expected, abs=1e-5)
 
 
@@ -162,15 +162,16 @@ def test_cameras_of_all_round_are_in_the_order_of_the_features():
     names = [channel.name for channel in channels]
     assert len(set(names)) == NUM_ALL_ROUND
     assert names[4:6] == ["ground2.5", "upright0.28"]
+    assert names[9:11] == ["upright2.5", "low0.75"]
     assert {channel.neuron for channel in channels[:NUM_FORWARD_FIELDS]} == {"dsn"}
-    assert names[10:13] == ["near_left_dsn", "near_right_dsn", "middle_left_dsn"]
+    assert names[13:16] == ["near_left_dsn", "near_right_dsn", "middle_left_dsn"]
     sides = channels[NUM_FORWARD_FIELDS:]
     for first, others in ((sides[k], sides[k::NUM_SIDE_FIELDS]) for k in range(NUM_SIDE_FIELDS)):
         assert [channel.neuron for channel in others] == ["dsn", "edges"]
         assert all((channel.camera, channel.columns) == (first.camera, first.columns) for channel in others)
     columns = [channel.columns for channel in channels]
-    assert sum(columns[:NUM_FORWARD_FIELDS]) == NUM_FORWARD_COLUMNS == 100
-    assert sum(columns) == NUM_COLUMNS == 160
+    assert sum(columns[:NUM_FORWARD_FIELDS]) == NUM_FORWARD_COLUMNS == 130
+    assert sum(columns) == NUM_COLUMNS == 190
     assert ZONE_INPUTS["columns"].size == 4 * NUM_COLUMNS
 
 
@@ -178,7 +179,7 @@ def test_missing_or_other_observations_are_rejected():
     two_cameras = observe(1.0) | {"membrane_potential": np.array([0.5, 0.6]), "ego_yaw_rate": np.zeros(1)}
     with pytest.raises(ValueError, match="requires the 17 cameras of stopping-zone, got 2; train with"):
         update(zone_history(), two_cameras)
-    with pytest.raises(ValueError, match="'sides_ffi' requires the 22 cameras of all-round, got 17; train"):
+    with pytest.raises(ValueError, match="'sides_ffi' requires the 25 cameras of all-round, got 17; train"):
         update(zone_history("sides_ffi"), observe_zones(zone_levels()))
     with pytest.raises(ValueError, match="requires the observation 'ffi', got"):
         update(FeatureHistory(FeatureConfig(inputs=("ffi",))), observe(1.0))
@@ -224,5 +225,5 @@ def test_blocks_larger_than_the_frame_are_rejected():
 
 def test_columns_require_the_cameras_of_all_round():
     features = FeatureConfig(inputs=("columns",), history=1)
-    with pytest.raises(ValueError, match="requires the 160 columns of all-round, got 0; train with"):
+    with pytest.raises(ValueError, match="requires the 190 columns of all-round, got 0; train with"):
         features.box_arguments({"membrane_potential": (17,)})

@@ -38,7 +38,7 @@ def copy_with_card(policy, path, **values):
         ({"camera": 7}, "the card is damaged"),
         ({"features": {"inputs": ["zone"]}}, "did you mean 'zones'"),
         ({"camera": zone_cameras()[1:]}, "input 'zones' requires the 17 cameras of stopping-zone, got 16"),
-        ({"features": {"inputs": ["columns"]}}, "'columns' requires the 160 columns of all-round, got 0"),
+        ({"features": {"inputs": ["columns"]}}, "'columns' requires the 190 columns of all-round, got 0"),
         ({"demands": [0.0, -1.5]}, r"demand must be in \[-1, 1\], got -1.5"),
         (
             {"demands": [0.0]},

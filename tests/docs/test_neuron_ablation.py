@@ -65,10 +65,10 @@ def test_pixels_are_linear(script):
 
 
 def test_each_lens_is_drawn_once(script):
-    """Six detectors share the ground and upright fields; three the near, middle and far pairs."""
+    """Six detectors share the ground, upright and low fields; three the near, middle and far pairs."""
     sensors = SensorArray(script.cameras(), 30.0, LGMDParams())
     assert len(sensors.names) == 6 * NUM_FORWARD_FIELDS + 3 * NUM_SIDE_FIELDS
-    assert [len(group.frames[0]) for group in sensors._drawing.groups] == [5, 5, 2, 2, 2]
+    assert [len(group.frames[0]) for group in sensors._drawing.groups] == [5, 5, 3, 2, 2, 2]
     assert sensors.names[-NUM_SIDE_FIELDS:] == [f"{name}_edges" for name in side_names()]
     assert sensors.names[-3 * NUM_SIDE_FIELDS :][:NUM_SIDE_FIELDS] == [
         f"{name}_lgmd" for name in side_names()

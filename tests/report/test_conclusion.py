@@ -169,7 +169,7 @@ def test_limits_of_the_protocol():
     [
         ("no-brake", "Never brakes."),
         ("spike-threshold:threshold=45", "Brakes fully when the spike frequency reaches a threshold."),
-        ("policy:all-round", "Learned policy (time-to-brake) with 22 cameras, the inputs columns, sides_ffi"),
+        ("policy:all-round", "Learned policy (time-to-brake) with 25 cameras, the inputs columns, sides_ffi"),
         ("policy:missing.zip", "A learned policy, whose card cannot be read."),
         ("no_such_module:Agent", "A class from outside this package, which cannot be loaded."),
     ],
