@@ -139,7 +139,7 @@ class Policy(StagedAgent):
         file = find_policy(path)
         self.card = policy_card(file)
         _check_fields(file, self.card)
-        self.network = _load_network(file, self.card)
+        self.network = load_network(file, self.card)
         names = tuple(getattr(self.network.observation_space, "spaces", ()))
         self._check_network(file, names)
         self._margin = margin
@@ -383,7 +383,12 @@ def _count(camera: "ChannelSpec") -> int:
     return len(camera) if isinstance(camera, list | tuple) else 1
 
 
-def _load_network(path: Path, card: PolicyCard) -> Any:
+def load_network(path: Path, card: PolicyCard) -> Any:
+    """Return the network in a policy file, a `BasePolicy`.
+
+    Raises:
+        ValueError: If stable-baselines3 is not installed, or the file is damaged or does not fit its card.
+    """
     try:
         import stable_baselines3
         import torch

@@ -7,11 +7,11 @@
 The folder is one of `lgmd-gym train --algo time-to-brake`. A family is that of the recorded scenario: CutIn
 includes the levels of CutInThreat and those without their target. The levels of the families with an odd seed
 are set aside for the test. One network is trained on all other training episodes, and one per family on those
-that are not of this family; nor does it select the epoch. The table has the shares of the tested threats that
-are recognised in time: the log odds of full braking exceed a threshold while full braking still avoids the
-contact, and before the recorded driver brakes. Threats in which the driver brakes earlier than 0.3 s before
-the last moment are left out. The threshold of each network is the one that 5 % of the validation levels
-without a threat exceed. Levels of `error_levels` count as the others.
+that are not of this family; nor does it select the epoch. All start from random weights. The table has the
+shares of the tested threats that are recognised in time: the log odds of full braking exceed a threshold
+while full braking still avoids the contact, and before the recorded driver brakes. Threats in which the
+driver brakes earlier than 0.3 s before the last moment are left out. The threshold of each network is the one
+that 5 % of the validation levels without a threat exceed. Levels of `error_levels` count as the others.
 """
 
 import argparse

@@ -7,10 +7,10 @@
 Random levels are recorded once, in the folder DATA: the forward fields of `policy:all-round` through six
 detectors, and its fields at the sides through three. Each lens is drawn once for all detectors. A driver
 brakes at random in the training levels, and never in the validation levels. Then one network per arm and seed
-learns the time to brake with the levels and the recipe of `policy:all-round`, without its ensemble, its
-traffic and its error levels: the arms differ in their inputs only. Half of the validation levels select the
-epoch and the margin of each network, and the tables have the results on the other half, with paired
-differences to the first arm of each group. Intervals are clustered by world and by training.
+learns the time to brake from random weights, with the levels of `policy:all-round`, but without its
+traffic, error levels and loss of episodes: the arms differ in their inputs only. Half of the validation
+levels select the epoch and the margin of each network, and the tables have the results on the other half,
+with paired differences to the first arm of each group. Intervals are clustered by world and by training.
 
 A network brakes at the first decision whose log odds of a time to brake below 0.6 s exceed its margin, which
 is exceeded in one of ten selection levels without a threat. So the arms are compared at about the same rate

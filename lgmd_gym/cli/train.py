@@ -57,8 +57,8 @@ class Train:
     recordings: File = None
     """Folder of a training run on recordings with the same cameras, to reuse its recorded episodes."""
     start: Name = None
-    """Policy with the same inputs whose network time-to-brake starts from: a file, or a name in this package
-    such as all-round. Default: random weights."""
+    """Policy with the same inputs and cameras, or fewer fields ahead, whose network time-to-brake starts
+    from: a file, or a name in this package such as all-round. Default: random weights."""
     traffic_episodes: Count = None
     """Number of traffic episodes that training on recordings uses in addition.
     Default: from the hyperparameters, else 0."""

@@ -157,8 +157,8 @@ class TrainConfig(Record):
     start: str | None = optional(
         text(
             None,
-            'Policy with the same inputs whose network "time-to-brake" starts from: a file, or a name in '
-            "this package; None for random weights",
+            'Policy with the same inputs and cameras, or fewer fields ahead, whose network "time-to-brake" '
+            "starts from: a file, or a name in this package; None for random weights",
         )
     )
     traffic_episodes: int = whole(

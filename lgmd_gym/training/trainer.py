@@ -233,7 +233,8 @@ def _make_learner(config: TrainConfig, env: PolicyWrapper) -> "TimeToBrakeLearne
         start = None
         if config.start is not None:
             brake = TimeToBrakeParams.make(config.algo_kwargs.get("brake"))
-            start = load_start(config.start, config.features, config.camera, brake)
+            neuron = config.env_kwargs.get("params")
+            start = load_start(config.start, config.features, config.camera, brake, neuron)
         return TimeToBrakeLearner(config.policy, env, seed=config.seed, start=start, **config.algo_kwargs)
     except UNSUITABLE as error:  # those of the learner itself are ValueErrors
         raise _cannot_make(config, error) from None

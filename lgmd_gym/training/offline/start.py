@@ -1,34 +1,43 @@
 # pyright: standard
 # Not strict: torch and stable-baselines3 state few types.
-"""Network that a training on recorded episodes starts from, also of a policy with fewer cameras."""
+"""Network that a training on recorded episodes starts from, also of a policy with fewer fields ahead."""
 
 from dataclasses import replace
+from math import prod
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
 
-from lgmd_gym.agents.policies.card import policy_card
+from lgmd_gym.agents.policies.card import PolicyCard, policy_card
 from lgmd_gym.agents.policies.evidence import TimeToBrakeParams
 from lgmd_gym.agents.policies.features import NUM_LEVELS, FeatureConfig
-from lgmd_gym.agents.policies.policy import Policy, find_policy
+from lgmd_gym.agents.policies.policy import Policy, find_policy, load_network
 from lgmd_gym.agents.sides import NEURONS, NUM_SIDE_FIELDS
+from lgmd_gym.aliases import Values
 from lgmd_gym.sensing.channel import make_channels, plain_values
 from lgmd_gym.training.offline.networks import linear_layers
 
 if TYPE_CHECKING:
     from stable_baselines3.common.policies import BasePolicy
 
+    from lgmd_gym.neuron import NeuronSpec
     from lgmd_gym.sensing.channel import ChannelSpec
 
-COLUMNS = "columns"
-# Inputs of policies that may get more cameras: further fields ahead add columns, and change no other input.
-EXTENSIBLE = (COLUMNS, "sides_ffi", "ego_speed", "ego_acceleration", "ego_yaw_rate", "known_deceleration")
+ALGO = "ppo"  # class of stable-baselines3 that has the networks of time-to-brake
+COLUMNS, SIDES = "columns", "sides_ffi"
+# Further fields ahead add columns. They leave the other ones of these inputs as they are.
+EXTENSIBLE = (COLUMNS, SIDES, "ego_speed", "ego_acceleration", "ego_yaw_rate", "known_deceleration")
 NUM_SIDE_CAMERAS = NUM_SIDE_FIELDS * len(NEURONS)
 
 
 def load_start(
-    start: str, features: FeatureConfig, camera: "ChannelSpec", brake: TimeToBrakeParams
+    start: str,
+    features: FeatureConfig,
+    camera: "ChannelSpec",
+    brake: TimeToBrakeParams,
+    neuron: "NeuronSpec" = None,
 ) -> "BasePolicy":
     """Return the network of a policy for a training with the same cameras, or with more fields ahead.
 
@@ -36,56 +45,81 @@ def load_start(
 
     Args:
         start: Policy file, or name of a policy in the package.
-        features: Inputs of the training.
-        camera: Cameras of the training. Those of the policy must be among them in the same order, with the
-            same cameras at the sides at the end.
+        features: Inputs of the training. More fields require `columns`, and no other input of every camera.
+        camera: Cameras of the training. Those of the policy must be among them in the same order, and with
+            the input `sides_ffi` those at the sides must be the same ones, at the end.
         brake: Brake of the training.
+        neuron: Neuron parameters of the training.
 
     Raises:
-        ValueError: If the policy cannot be loaded, or has other inputs, cameras or intervals.
+        ValueError: If the policy cannot be loaded, or has other inputs, cameras, neurons or intervals, or is
+            no policy of time-to-brake.
     """
     path = find_policy(start)
     card = policy_card(path)
-    given, required = _channels(card.camera), _channels(camera)
-    own = np.array([channel in given for channel in required])
-    extended = bool(card.network and not own.all() and {*features.inputs} <= {*EXTENSIBLE})
-    if extended:
-        same = given == [channel for channel in required if channel in given]
-        same = same and given[-NUM_SIDE_CAMERAS:] == required[-NUM_SIDE_CAMERAS:]
-    else:
-        same = given == required
+    given, required = plain_values(make_channels(card.camera)), plain_values(make_channels(camera))
+    known = [channel in given for channel in required]
+    if card.brake is None or card.algo != ALGO:
+        raise ValueError(f"start {start!r} is no policy of time-to-brake; start from one, or omit start")
     faults = {
         "inputs": card.features != features,
-        "cameras": not same,
-        "limits_s": card.brake is None or card.brake.limits_s != brake.limits_s,
+        "normalisation": card.vec_normalize is not None,
+        "neurons": plain_values(card.neuron) != plain_values(neuron),
+        "limits_s": card.brake.limits_s != brake.limits_s,
+        "cameras": given != required and not _extensible(card, features, given, required),
     }
-    for name in (name for name, differs in faults.items() if differs):
+    fault = next((name for name, differs in faults.items() if differs), None)
+    if fault is not None:
+        fewer = f", or of {COLUMNS} with fewer fields ahead" if fault == "cameras" else ""
         raise ValueError(
-            f"start {start!r} has other {name} than the training; "
-            f"start from a policy with the same {name}, or omit start"
+            f"start {start!r} has other {fault} than the training; "
+            f"start from a policy with the same {fault}{fewer}, or omit start"
         )
-    if card.network is None or not extended:
+    if given == required:
         return Policy(start).network
-    known = np.tile(np.repeat(own, [channel["columns"] for channel in required]), NUM_LEVELS)
-    inputs = card.network.inputs | {COLUMNS: (len(known),)}
-    network = replace(card.network, inputs=inputs).build(card.algo, card.num_actions)
-    # stable-baselines3 concatenates the inputs in the order of their names
-    parts = [known if name == COLUMNS else np.ones(inputs[name], np.bool_) for name in sorted(inputs)]
-    _copy(card.network.load(path, card.algo, card.num_actions), network, np.concatenate(parts))
-    return network
+    columns = np.repeat(known, [channel["columns"] for channel in required])
+    return _extended(path, card, np.tile(columns, NUM_LEVELS))
 
 
-def _channels(camera: "ChannelSpec") -> list[Any]:
-    """Return channels as plain values."""
-    return plain_values(make_channels(camera))
+def _extensible(
+    card: PolicyCard, features: FeatureConfig, given: list[Values], required: list[Values]
+) -> bool:
+    """Return whether the required channels are the given ones with more fields ahead."""
+    if card.network is None or COLUMNS not in features.inputs or not {*features.inputs} <= {*EXTENSIBLE}:
+        return False
+    if SIDES in features.inputs and given[-NUM_SIDE_CAMERAS:] != required[-NUM_SIDE_CAMERAS:]:
+        return False
+    return given == [channel for channel in required if channel in given]
 
 
 @torch.no_grad()
-def _copy(source: Any, target: Any, known: np.ndarray) -> None:
-    """Copy the weights of the layers; `known` has the inputs of the target that the source has, bool."""
-    first, *others = zip(linear_layers(source), linear_layers(target), strict=True)
-    first[1].weight.zero_()
-    first[1].weight[:, torch.from_numpy(known)] = first[0].weight
-    first[1].bias.copy_(first[0].bias)
-    for given, own in others:
-        own.load_state_dict(given.state_dict())
+def _extended(path: Path, card: PolicyCard, known: np.ndarray) -> Any:
+    """Return the network of a policy with more columns.
+
+    Args:
+        path: Policy file.
+        card: Its card, with a network.
+        known: Which values of the input `columns` the policy has, bool.
+
+    Raises:
+        ValueError: If the file cannot be loaded, or its network has other inputs than the card.
+    """
+    assert card.network is not None
+    assert card.features is not None
+    source, inputs = load_network(path, card), card.network.inputs
+    if inputs.keys() != {*card.features.inputs} or inputs[COLUMNS] != (np.sum(known),):
+        raise ValueError(
+            f"policy {str(path)!r}: the network of the card has other inputs than its features and cameras; "
+            "correct the card, or train it again"
+        )
+    target = replace(card.network, inputs=inputs | {COLUMNS: known.shape}).build(card.algo, card.num_actions)
+    # stable-baselines3 concatenates the inputs in the order of their names
+    parts = [known if name == COLUMNS else np.ones(prod(inputs[name]), np.bool_) for name in sorted(inputs)]
+    first, *others = linear_layers(target)
+    given, *rest = linear_layers(source)
+    first.weight.zero_()
+    first.weight[:, torch.from_numpy(np.concatenate(parts))] = given.weight
+    first.bias.copy_(given.bias)
+    for layer, other in zip(others, rest, strict=True):
+        layer.load_state_dict(other.state_dict())
+    return target
