@@ -116,7 +116,7 @@ def test_cameras_are_presets_or_those_of_an_agent():
         TrainConfig.from_hyperparams("sac", sensors_of="spike-threshold")
     with pytest.raises(ValueError, match="unknown agent 'allround'; did you mean 'all-round'"):
         TrainConfig.from_hyperparams("sac", sensors_of="allround")
-    assert len(TrainConfig.from_hyperparams("sac", sensors_of="all-round").camera) == 22
+    assert len(TrainConfig.from_hyperparams("sac", sensors_of="all-round").camera) == 25
 
 
 @pytest.mark.parametrize(
