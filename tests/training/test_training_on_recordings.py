@@ -88,7 +88,7 @@ def test_policy_with_fields_at_the_sides(tmp_path):
     agent = make_agent(f"policy:{tmp_path / 'run' / 'policy.zip'}")
     env = gym.make("LGMD/CPNA-v0", ego_speed=8.0, camera=agent.camera)
     observation, info = env.reset(seed=0)
-    assert observation["membrane_potential"].shape == (22,)
+    assert observation["membrane_potential"].shape == (25,)
     assert observation["column_potential"].shape == (160,)
     agent.reset(0)
     for _ in range(10):
