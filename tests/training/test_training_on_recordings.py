@@ -89,8 +89,8 @@ def test_policy_with_fields_at_the_sides(tmp_path):
     env = gym.make("LGMD/CPNA-v0", ego_speed=8.0, camera=agent.camera)
     observation, info = env.reset(seed=0)
     assert observation["membrane_potential"].shape == (25,)
-    assert observation["column_potential"].shape == (160,)
+    assert observation["column_potential"].shape == (190,)
     agent.reset(0)
     for _ in range(10):
         observation, _, _, _, info = env.step(agent.act(observation, info))
-    assert observation["membrane_potential"][10:16].min() < 0.5  # motion to the left
+    assert observation["membrane_potential"][13:19].min() < 0.5  # motion to the left
