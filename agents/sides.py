@@ -17,9 +17,10 @@ from lgmd_gym.aliases import Values
 # is beside the ego's lane until the last second: all low fields, and the others for every other zone and one
 # beyond them for warnings.
 FORWARD_WIDTH_PX, FORWARD_SPAN_M, FORWARD_COLUMNS = 160, 2.0 * SPAN_M, 10
+_SPARSE = (*REACHES[::2], 2.5)
 FORWARD_REACHES = {
-    "ground": (*REACHES[::2], 2.5),
-    "upright": (*REACHES[::2], 2.5),
+    "ground": _SPARSE,
+    "upright": _SPARSE,
     "low": tuple(REACHES[zone] for zone in LOW_ZONES),
 }
 NUM_FORWARD_FIELDS = sum(len(reaches) for reaches in FORWARD_REACHES.values())
@@ -47,16 +48,17 @@ SIDES = {
     "far": SidePair(43.0, 34.0, -1.9, 8),
 }
 NUM_SIDE_FIELDS = 2 * len(SIDES)  # per neuron
-NUM_ALL_ROUND = NUM_FORWARD_FIELDS + NUM_SIDE_FIELDS * len(NEURONS)
+NUM_SIDE_CAMERAS = NUM_SIDE_FIELDS * len(NEURONS)
+NUM_ALL_ROUND = NUM_FORWARD_FIELDS + NUM_SIDE_CAMERAS
 NUM_FORWARD_COLUMNS = NUM_FORWARD_FIELDS * FORWARD_COLUMNS
-NUM_COLUMNS = NUM_FORWARD_COLUMNS + NUM_SIDE_FIELDS * len(NEURONS) * SIDE_COLUMNS
+NUM_COLUMNS = NUM_FORWARD_COLUMNS + NUM_SIDE_CAMERAS * SIDE_COLUMNS
 
 
 def forward_cameras() -> list[Values]:
-    """Return the channels of the path: five ground, five upright and three low fields, nearest first each.
+    """Return the channels of the path: five ground, five upright and three low fields.
 
-    They have ten columns of 0.48 m at the far end. Their stopping distance follows the car's estimate of its
-    full braking.
+    The fields of each kind are in the order of their reach, and have ten columns of 0.48 m at the far end.
+    Their stopping distance follows the car's estimate of its full braking.
     """
     cameras = [
         zone_camera(kind, reach, DRY_DECELERATION, REACTION)

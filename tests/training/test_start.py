@@ -115,10 +115,13 @@ def test_other_cameras_and_inputs_are_refused(tmp_path, cameras, features, name)
     ("changes", "message"),
     [
         ({"brake": BRAKE.to_dict() | {"limits_s": [0.2, 0.6, 1.2, 2.6]}}, "has other limits_s than"),
-        ({"brake": None, "demands": [0.0, -0.2, -0.4, -0.6, -1.0]}, "is no policy of time-to-brake; start"),
-        ({"algo": "dqn"}, "is no policy of time-to-brake; start from one"),
+        (
+            {"brake": None, "demands": [0.0, -0.2, -0.4, -0.6, -1.0]},
+            "was not trained with time-to-brake; start",
+        ),
+        ({"algo": "dqn"}, "was not trained with time-to-brake; start from"),
         ({"neuron": {"t_sp": 0.9}}, "has other neurons than the training"),
-        ({"vec_normalize": "start-vecnormalize.npz"}, "has other normalisation than the training"),
+        ({"vec_normalize": "start-vecnormalize.npz"}, "was not trained with time-to-brake"),
         ({"network": None}, "has other cameras than the training; .* or of columns with fewer fields ahead"),
     ],
 )

@@ -28,6 +28,7 @@ from lgmd_gym.agents.sides import (
     FORWARD_NEURON,
     NEURONS,
     NUM_FORWARD_COLUMNS,
+    NUM_SIDE_CAMERAS,
     NUM_SIDE_FIELDS,
     SIDE_COLUMNS,
 )
@@ -233,7 +234,7 @@ def _fields() -> Mirror:
 def _columns() -> Mirror:
     """Return the mirror image of the columns; the signs of direction-selective neurons change."""
     forward = np.arange(NUM_FORWARD_COLUMNS).reshape(-1, FORWARD_COLUMNS)[:, ::-1].ravel()
-    count = NUM_SIDE_FIELDS * len(NEURONS) * SIDE_COLUMNS
+    count = NUM_SIDE_CAMERAS * SIDE_COLUMNS
     sides = NUM_FORWARD_COLUMNS + np.arange(count).reshape(-1, 2, SIDE_COLUMNS)[:, ::-1, ::-1].ravel()
     signs = {neuron: -1.0 if neuron == "dsn" else 1.0 for neuron in (FORWARD_NEURON, *NEURONS)}
     parts = [np.full(NUM_FORWARD_COLUMNS, signs[FORWARD_NEURON])]

@@ -14,7 +14,7 @@ from lgmd_gym.agents.policies.card import PolicyCard, policy_card
 from lgmd_gym.agents.policies.evidence import TimeToBrakeParams
 from lgmd_gym.agents.policies.features import NUM_LEVELS, FeatureConfig
 from lgmd_gym.agents.policies.policy import Policy, find_policy, load_network
-from lgmd_gym.agents.sides import NEURONS, NUM_SIDE_FIELDS
+from lgmd_gym.agents.sides import NUM_SIDE_CAMERAS
 from lgmd_gym.aliases import Values
 from lgmd_gym.sensing.channel import make_channels, plain_values
 from lgmd_gym.training.offline.networks import linear_layers
@@ -27,9 +27,8 @@ if TYPE_CHECKING:
 
 ALGO = "ppo"  # class of stable-baselines3 that has the networks of time-to-brake
 COLUMNS, SIDES = "columns", "sides_ffi"
-# Further fields ahead add columns. They leave the other ones of these inputs as they are.
+# Inputs of policies that can get more fields ahead: these add columns, and change no other of these inputs.
 EXTENSIBLE = (COLUMNS, SIDES, "ego_speed", "ego_acceleration", "ego_yaw_rate", "known_deceleration")
-NUM_SIDE_CAMERAS = NUM_SIDE_FIELDS * len(NEURONS)
 
 
 def load_start(
@@ -52,18 +51,18 @@ def load_start(
         neuron: Neuron parameters of the training.
 
     Raises:
-        ValueError: If the policy cannot be loaded, or has other inputs, cameras, neurons or intervals, or is
-            no policy of time-to-brake.
+        ValueError: If the policy cannot be loaded, was not trained with time-to-brake, or has other inputs,
+            cameras, neurons or intervals.
     """
     path = find_policy(start)
     card = policy_card(path)
     given, required = plain_values(make_channels(card.camera)), plain_values(make_channels(camera))
-    known = [channel in given for channel in required]
-    if card.brake is None or card.algo != ALGO:
-        raise ValueError(f"start {start!r} is no policy of time-to-brake; start from one, or omit start")
+    if card.brake is None or card.algo != ALGO or card.vec_normalize is not None:
+        raise ValueError(
+            f"start {start!r} was not trained with time-to-brake; start from a policy that was, or omit start"
+        )
     faults = {
         "inputs": card.features != features,
-        "normalisation": card.vec_normalize is not None,
         "neurons": plain_values(card.neuron) != plain_values(neuron),
         "limits_s": card.brake.limits_s != brake.limits_s,
         "cameras": given != required and not _extensible(card, features, given, required),
@@ -77,6 +76,7 @@ def load_start(
         )
     if given == required:
         return Policy(start).network
+    known = [channel in given for channel in required]
     columns = np.repeat(known, [channel["columns"] for channel in required])
     return _extended(path, card, np.tile(columns, NUM_LEVELS))
 
