@@ -258,13 +258,35 @@ def test_the_loss_of_episodes_makes_the_brake_act_in_time():
         learner.learn(dataset, dataset, lambda _, metrics, found=epochs: found.append(metrics))
         losses.append(epochs[-1]["episode_loss"])
         found = []
-        for learner.episode_weight in (0.0, 2.5):
+        for learner.episode_weight, learner.warning_weight in ((0.0, 0.0), (2.5, 0.0), (2.5, 1.5)):
             found.append(learner.evaluate(dataset, Standardisation(torch.zeros(1), torch.ones(1))))
-        assert found[0].episode_loss == found[1].episode_loss > 0.0
+        assert len({item.episode_loss for item in found}) == len({item.warning_loss for item in found}) == 1
         assert found[1].loss - found[0].loss == pytest.approx(2.5 * found[0].episode_loss, rel=1e-6)
+        assert found[2].loss - found[1].loss == pytest.approx(1.5 * found[0].warning_loss, rel=1e-6)
         weights.append(learner.model.policy.action_net.weight)
     assert losses[2] < 0.6 * min(losses[:2])
     assert not torch.equal(weights[1], weights[2])
+
+
+def test_the_loss_of_warnings_makes_the_warning_act_in_time():
+    """Half of the decisions 2 to 4 s before the last moment look like those of safe episodes."""
+    rng, made = np.random.default_rng(0), []
+    for index in range(80):
+        threat = index % 4 == 0
+        speed = rng.choice([10.0, 20.0] if threat else [10.0], (10, 1)).astype(np.float32)
+        times = np.arange(10, 0, -1) / 5.0 + 1.8 if threat else np.full(10, np.inf)
+        made.append(DrivenEpisode({"ego_speed": speed}, times.astype(np.float32), np.zeros(10), threat))
+    dataset = StateDataset(made, FeatureConfig(inputs=("ego_speed",), history=1, repeat=1), BRAKE["limits_s"])
+    losses = []
+    for weight in (0.0, 3.0):
+        options = {"episode_weight": 0.1, "warning_weight": weight, "n_epochs": 40, "batch_size": 100}
+        learner = TimeToBrakeLearner(
+            "MultiInputPolicy", Blank(), brake=BRAKE, dropout=0.0, learning_rate=0.01, **options
+        )
+        learner.learn(
+            dataset, dataset, lambda _, metrics, found=losses: found.append(metrics["warning_loss"])
+        )
+    assert losses[-1] < 0.6 * losses[39]
 
 
 def test_training_in_bfloat16_differs_by_rounding():
@@ -352,6 +374,10 @@ def test_training_writes_a_policy_with_a_brake(tmp_path):
         (
             {"text": YAML.replace("n_epochs: 2", "episode_weight: -1")},
             r"episode_weight must be in \[0, 100\], got -1",
+        ),
+        (
+            {"text": YAML.replace("n_epochs: 2", "warning_weight: 0.5")},
+            "warning_weight 0.5 requires an episode_weight above 0",
         ),
         ({"text": YAML.replace("n_epochs: 2", "bfloat16: 1")}, "bfloat16 must be true or false, got 1"),
         ({"text": YAML.replace("history: 1", "history: 2")}, "requires history: 1"),

@@ -18,7 +18,7 @@ from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import check_flag, check_positive, check_whole, check_within
 from lgmd_gym.statistics.ranks import roc_area
 from lgmd_gym.training.offline.dataset import StateDataset, check_mirror
-from lgmd_gym.training.offline.episode_loss import EpisodeTarget, episode_loss, find_targets
+from lgmd_gym.training.offline.episode_loss import EpisodeTarget, episode_losses, find_targets
 from lgmd_gym.training.offline.networks import (
     Optimizer,
     Standardisation,
@@ -45,8 +45,10 @@ EVALUATED_STATES = 4096  # at once
 class StateEvaluation(NamedTuple):
     """Results on the decisions of the validation episodes."""
 
-    loss: float  # weighted mean of the cross-entropy, plus `episode_weight` times `episode_loss`
-    episode_loss: float  # see `lgmd_gym.training.offline.episode_loss`
+    loss: float  # weighted mean of the cross-entropy, plus that of both losses of whole episodes
+    # see `lgmd_gym.training.offline.episode_loss`
+    episode_loss: float
+    warning_loss: float
     # areas under the ROC curve for the time to brake below the limit of full braking
     area: float  # of all decisions
     area_braking: float  # of those under braking; NaN without both outcomes
@@ -94,6 +96,8 @@ class TimeToBrakeLearner:
         traffic_weight: Weight of a decision in traffic, in [0.01, 100]; one in a level has weight 1.
         episode_weight: Weight of the loss of whole episodes, in [0, 100], see
             `lgmd_gym.training.offline.episode_loss`. Above 0, episodes are shuffled in place of decisions.
+        warning_weight: Weight of the same loss of the warning, in [0, 100]; above 0, `episode_weight` must
+            be, too.
         bfloat16: Whether matrix products are in bfloat16, which saves time on CPUs with instructions for it
             (AVX-512 BF16) and takes longer than float32 on others.
         policy_kwargs: Further arguments of the network.
@@ -120,6 +124,7 @@ class TimeToBrakeLearner:
         mirror: bool = True,
         traffic_weight: float = 1.0,
         episode_weight: float = 0.0,
+        warning_weight: float = 0.0,
         bfloat16: bool = False,
         policy_kwargs: Arguments | None = None,
     ) -> None:
@@ -132,6 +137,11 @@ class TimeToBrakeLearner:
         self.mirror = check_flag("mirror", mirror)
         self.traffic_weight = check_within("traffic_weight", traffic_weight, 0.01, 100.0)
         self.episode_weight = check_within("episode_weight", episode_weight, 0.0, 100.0)
+        self.warning_weight = check_within("warning_weight", warning_weight, 0.0, 100.0)
+        if self.warning_weight and not self.episode_weight:
+            raise ValueError(
+                f"warning_weight {warning_weight:g} requires an episode_weight above 0; set both"
+            )
         self.bfloat16 = check_flag("bfloat16", bfloat16)
         self._seed, count = seed, check_whole("n_networks", n_networks, 1)
         given: Any = env.observation_space
@@ -219,14 +229,16 @@ class TimeToBrakeLearner:
             ]
         )
         lengths, targets = np.diff(dataset.bounds).tolist(), find_targets(dataset, self.brake)
-        of_episodes = float(episode_loss(torch.from_numpy(logits), lengths, targets, self.brake))
+        parts = episode_losses(torch.from_numpy(logits), lengths, targets, self.brake)
+        of_episodes, of_warnings = map(float, parts)
         limit = self.brake.limits_s.index(self.brake.full_s)
         due, odds, braking = dataset.classes <= limit, self.brake.odds(logits)[:, limit], dataset.braking
         losses = cross_entropy(torch.from_numpy(logits), torch.from_numpy(dataset.classes), reduction="none")
         loss = float(np.average(losses.numpy(), weights=self._weights(dataset.in_traffic)))
         return StateEvaluation(
-            loss + self.episode_weight * of_episodes,
+            loss + self.episode_weight * of_episodes + self.warning_weight * of_warnings,
             of_episodes,
+            of_warnings,
             roc_area(odds[due], odds[~due]),
             roc_area(odds[due & braking], odds[~due & braking]),
         )
@@ -309,10 +321,11 @@ class TimeToBrakeLearner:
     def _episode_loss(
         self, logits: torch.Tensor, lengths: list[int], targets: list[EpisodeTarget]
     ) -> torch.Tensor | float:
-        """Return the weighted loss of the whole episodes of a batch."""
+        """Return the weighted losses of the whole episodes of a batch."""
         if not lengths:
             return 0.0
-        return self.episode_weight * episode_loss(logits, lengths, targets, self.brake)
+        braking, warning = episode_losses(logits, lengths, targets, self.brake)
+        return self.episode_weight * braking + self.warning_weight * warning
 
     def _weights(self, in_traffic: np.ndarray) -> np.ndarray:
         """Return the weights of decisions, float32, (M,)."""
