@@ -1,5 +1,6 @@
 """Loss of whole episodes: targets, log odds of braking and of the warning, and the smooth maximum."""
 
+from dataclasses import replace
 from math import inf
 
 import numpy as np
@@ -15,7 +16,7 @@ from lgmd_gym.training.offline.episode_loss import (
     braking_odds,
     episode_losses,
     find_targets,
-    warning_odds,
+    shifted_warning_odds,
 )
 from lgmd_gym.training.offline.episodes import DrivenEpisode
 
@@ -49,14 +50,14 @@ def dataset(*episodes):
         ([inf] * 4, [0.0, -0.5, 0.0, 0.0], [0, 1], [0, 1], 1.0),
         ([0.0, 0.0], [0.0, 0.0], [], [], -1.0),  # always too late
         ([1.5, 0.5, 0.3], [0.0] * 3, [0, 1, 2], [], -1.0),  # too late for a warning
-        ([4.0, 2.6, 2.5, 2.0, 0.3], [0.0] * 5, [2, 3, 4], [1, 2], -1.0),
+        ([4.0, 3.9, 2.6, 2.5, 2.01, 2.0, 0.3], [0.0] * 7, [3, 4, 5, 6], [1, 2, 3, 4], -1.0),
         # the demand of the last decision has no effect on it
         ([2.6, 2.5, 0.5, 0.4], [0.0, 0.0, 0.0, -1.0], [], [0, 1], -1.0),
         ([2.6, 2.5, 0.5, 0.4, 0.2], [0.0, 0.0, 0.0, -1.0, -1.0], [], [0, 1], -1.0),
     ],
 )
 def test_targets(times, demands, braking, warning, sign):
-    (target,) = find_targets(dataset((times, demands)), BRAKE)
+    (target,) = find_targets(dataset((times, demands)), replace(BRAKE, warning_s=1.2))
     assert (target.braking.tolist(), target.warning.tolist(), target.sign) == (braking, warning, sign)
 
 
@@ -69,18 +70,24 @@ def test_targets_are_those_of_each_episode():
 
 def test_the_stages_act_where_the_log_odds_exceed_the_threshold():
     logits = np.random.default_rng(0).normal(0.0, 2.0, (500, 5)).astype(np.float32)
-    for brake in (BRAKE, TimeToBrakeParams(full_s=0.6, full_odds=-0.2)):
+    early = replace(BRAKE, full_s=0.6, warning_s=1.2)
+    for brake in (BRAKE, early, TimeToBrakeParams(full_s=0.6, full_odds=-0.2)):
         evidence, _ = brake.evidence(brake.odds(logits))
         acts = braking_odds(torch.from_numpy(logits), brake).numpy() > brake.full_odds
         assert np.array_equal(acts, evidence == Evidence.FULL)
-        warns = warning_odds(torch.from_numpy(logits), brake).numpy() > brake.full_odds
+        warns = shifted_warning_odds(torch.from_numpy(logits), brake).numpy() > brake.full_odds
         assert np.array_equal(warns | acts, evidence >= Evidence.WARNING)
         assert 50 < acts.sum() < 450
 
 
+def test_no_second_condition():
+    logits = torch.tensor([[30.0, 0.0, 0.0, 0.0, 90.0]])
+    assert braking_odds(logits, replace(BRAKE, confirm_odds=-50.0)).item() == pytest.approx(-60.0, abs=1e-4)
+
+
 def test_the_losses_are_those_of_the_highest_log_odds():
     logits = torch.randn(9, 5, generator=torch.Generator().manual_seed(0), requires_grad=True)
-    odds = braking_odds(logits.detach(), BRAKE).numpy(), warning_odds(logits.detach(), BRAKE).numpy()
+    odds = braking_odds(logits.detach(), BRAKE).numpy(), shifted_warning_odds(logits.detach(), BRAKE).numpy()
     none, four = np.arange(0), np.arange(4)
     empty = EpisodeTarget(none, none, -1.0)
     targets = [EpisodeTarget(four, four, 1.0), empty, EpisodeTarget(np.array([1, 2]), np.array([0, 1]), -1.0)]

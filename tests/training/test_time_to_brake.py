@@ -17,6 +17,7 @@ from lgmd_gym.statistics.ranks import roc_area
 from lgmd_gym.training import TrainConfig, train
 from lgmd_gym.training.offline.dataset import StateDataset
 from lgmd_gym.training.offline.driving import NUM_ENVS, DriveRecorder, PulseDriver
+from lgmd_gym.training.offline.episode_loss import EpisodeTarget, episode_losses
 from lgmd_gym.training.offline.episodes import DrivenEpisode, load, record_parallel, save
 from lgmd_gym.training.offline.networks import Standardisation
 from lgmd_gym.training.offline.time_to_brake import TimeToBrakeLearner, leave_out
@@ -270,23 +271,50 @@ def test_the_loss_of_episodes_makes_the_brake_act_in_time():
 
 def test_the_loss_of_warnings_makes_the_warning_act_in_time():
     """Half of the decisions 2 to 4 s before the last moment look like those of safe episodes."""
-    rng, made = np.random.default_rng(0), []
+    rng, made, brake = np.random.default_rng(0), [], BRAKE | {"limits_s": [1.0, 2.0, 3.0], "warning_s": 3.0}
     for index in range(80):
         threat = index % 4 == 0
         speed = rng.choice([10.0, 20.0] if threat else [10.0], (10, 1)).astype(np.float32)
-        times = np.arange(10, 0, -1) / 5.0 + 1.8 if threat else np.full(10, np.inf)
+        times = np.arange(10, 0, -1) / 10.0 + 1.9 if threat else np.full(10, np.inf)
         made.append(DrivenEpisode({"ego_speed": speed}, times.astype(np.float32), np.zeros(10), threat))
-    dataset = StateDataset(made, FeatureConfig(inputs=("ego_speed",), history=1, repeat=1), BRAKE["limits_s"])
-    losses = []
+    features = FeatureConfig(inputs=("ego_speed",), history=1, repeat=1)
+    dataset, losses = StateDataset(made, features, brake["limits_s"]), []
     for weight in (0.0, 3.0):
         options = {"episode_weight": 0.1, "warning_weight": weight, "n_epochs": 40, "batch_size": 100}
         learner = TimeToBrakeLearner(
-            "MultiInputPolicy", Blank(), brake=BRAKE, dropout=0.0, learning_rate=0.01, **options
+            "MultiInputPolicy", Blank(), brake=brake, dropout=0.0, learning_rate=0.01, **options
         )
         learner.learn(
             dataset, dataset, lambda _, metrics, found=losses: found.append(metrics["warning_loss"])
         )
     assert losses[-1] < 0.6 * losses[39]
+
+
+def test_the_step_weighs_both_losses_of_episodes():
+    brake = BRAKE | {"limits_s": [1.0, 2.0, 3.0], "warning_s": 3.0}
+    learner = TimeToBrakeLearner(
+        "MultiInputPolicy", Blank(), brake=brake, episode_weight=2.5, warning_weight=1.5
+    )
+    logits, every = torch.randn(4, 4, generator=torch.Generator().manual_seed(0)), np.arange(4)
+    targets = [EpisodeTarget(every, every[:2], -1.0)]
+    braking, warning = episode_losses(logits, [4], targets, learner.brake)
+    loss = learner._episode_loss(logits, [4], targets)
+    assert loss.item() == pytest.approx(2.5 * braking.item() + 1.5 * warning.item())
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"warning_s": 2.0}, "requires a warning_s above 2, got 2; .* 2 to 4 s before the last moment"),
+        ({"warning_odds": 50.0}, "requires warning_odds between -50 .* and 50 .*, got 50"),
+        ({"full_odds": -50.0}, "requires full_odds between -50 .* and 50 .*, got -50"),
+    ],
+)
+def test_a_warning_that_the_loss_cannot_train(changes, message):
+    brake = BRAKE | {"limits_s": [1.0, 2.0, 3.0], "warning_s": 3.0} | changes
+    with pytest.raises(ValueError, match=f"warning_weight {message}"):
+        TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=brake, episode_weight=1.0, warning_weight=1.0)
+    TimeToBrakeLearner("MultiInputPolicy", Blank(), brake=brake, episode_weight=1.0)
 
 
 def test_training_in_bfloat16_differs_by_rounding():
@@ -378,6 +406,10 @@ def test_training_writes_a_policy_with_a_brake(tmp_path):
         (
             {"text": YAML.replace("n_epochs: 2", "warning_weight: 0.5")},
             "warning_weight 0.5 requires an episode_weight above 0",
+        ),
+        (
+            {"text": YAML.replace("n_epochs: 2", "warning_weight: -1")},
+            r"warning_weight must be in \[0, 100\], got -1",
         ),
         ({"text": YAML.replace("n_epochs: 2", "bfloat16: 1")}, "bfloat16 must be true or false, got 1"),
         ({"text": YAML.replace("history: 1", "history: 2")}, "requires history: 1"),

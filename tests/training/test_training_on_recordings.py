@@ -18,7 +18,7 @@ from lgmd_gym.training.offline.driving import DriveRecorder
 from lgmd_gym.training.offline.episodes import load
 from lgmd_gym.training.recordings import load_or_record
 
-LOSSES = ("train_loss", "loss", "best_loss", "episode_loss")
+LOSSES = ("train_loss", "loss", "best_loss", "episode_loss", "warning_loss")
 
 
 def arguments(folder, out, *options):

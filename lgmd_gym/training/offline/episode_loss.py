@@ -19,10 +19,25 @@ from lgmd_gym.training.offline.dataset import StateDataset
 
 # Of the smooth maximum log(Σ exp(3 m)) / 3. It exceeds the maximum, by log(T) / 3 if T log odds are equal.
 SHARPNESS = 3.0
-# Time to brake [s] from which to which a warning is of use. After one, Euro NCAP's driver brakes by 4 m/s²
-# in 1.2 s (AEB C2C v4.3.1, 8.4.6), and stops at 55 to 80 km/h if full braking could have waited for 2.0 to
-# 2.6 s.
+# Time to brake [s] within which a warning is of use. Euro NCAP's driver brakes by 4 m/s², 1.2 s after the
+# warning (AEB C2C v4.3.1, 8.4.6). Before a standing car, this is early enough if full braking by 9 m/s² could
+# still wait for 1.2 s + v / 14.4 m/s²: 1.8 s at 30 km/h, 2.7 s at 80 km/h, less with weaker brakes.
 WARNING_S = (2.0, 4.0)
+
+
+def check_warning(brake: TimeToBrakeParams) -> None:
+    """Raise ValueError for a warning that the loss cannot train."""
+    if brake.warning_s <= WARNING_S[0]:
+        raise ValueError(
+            f"warning_weight requires a warning_s above {WARNING_S[0]:g}, got {brake.warning_s:g}; the loss "
+            f"asks for warnings {WARNING_S[0]:g} to {WARNING_S[1]:g} s before the last moment"
+        )
+    for name in ("warning_odds", "full_odds"):
+        if abs(getattr(brake, name)) == MAX_ODDS:
+            raise ValueError(
+                f"warning_weight requires {name} between -{MAX_ODDS:g} (always) and {MAX_ODDS:g} (never), "
+                f"got {getattr(brake, name):g}"
+            )
 
 
 class EpisodeTarget(NamedTuple):
@@ -41,7 +56,8 @@ def find_targets(dataset: StateDataset, brake: TimeToBrakeParams) -> list[Episod
     at any of them. With one, the brake should act at one with a time to brake above 0 and below `present_s`,
     and the warning at one with a time to brake within `WARNING_S`. An episode with a threat has no target of
     the brake if the agent brakes while the time to brake is above the first limit, because a brake that waits
-    is right as well, and none of the warning if the agent brakes while it is above 2 s.
+    is right as well, and none of the warning if the agent brakes while it is above 2 s, or the episode begins
+    later. Whether the threat is visible is not considered.
     """
     targets: list[EpisodeTarget] = []
     for first, last in zip(dataset.bounds[:-1].tolist(), dataset.bounds[1:].tolist(), strict=True):
@@ -71,12 +87,14 @@ def episode_losses(
         logits: Logits of the decisions of whole episodes, one after the other, float32, (M, actions).
         lengths: Number of decisions of each episode.
         targets: Target of each episode.
-        brake: See `braking_odds` and `warning_odds`.
+        brake: See `braking_odds` and `shifted_warning_odds`.
     """
     signs = [target.sign for target in targets]
     return (
         _mean_loss(braking_odds(logits, brake), lengths, [target.braking for target in targets], signs),
-        _mean_loss(warning_odds(logits, brake), lengths, [target.warning for target in targets], signs),
+        _mean_loss(
+            shifted_warning_odds(logits, brake), lengths, [target.warning for target in targets], signs
+        ),
     )
 
 
@@ -94,7 +112,7 @@ def braking_odds(logits: torch.Tensor, brake: TimeToBrakeParams) -> torch.Tensor
     )
 
 
-def warning_odds(logits: torch.Tensor, brake: TimeToBrakeParams) -> torch.Tensor:
+def shifted_warning_odds(logits: torch.Tensor, brake: TimeToBrakeParams) -> torch.Tensor:
     """Return log odds that exceed `full_odds` where the policy warns, (M,), as those of `braking_odds`."""
     return _odds_below(logits, brake, brake.warning_s) - (brake.warning_odds - brake.full_odds)
 

@@ -18,7 +18,7 @@ from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import check_flag, check_positive, check_whole, check_within
 from lgmd_gym.statistics.ranks import roc_area
 from lgmd_gym.training.offline.dataset import StateDataset, check_mirror
-from lgmd_gym.training.offline.episode_loss import EpisodeTarget, episode_losses, find_targets
+from lgmd_gym.training.offline.episode_loss import EpisodeTarget, check_warning, episode_losses, find_targets
 from lgmd_gym.training.offline.networks import (
     Optimizer,
     Standardisation,
@@ -45,7 +45,7 @@ EVALUATED_STATES = 4096  # at once
 class StateEvaluation(NamedTuple):
     """Results on the decisions of the validation episodes."""
 
-    loss: float  # weighted mean of the cross-entropy, plus that of both losses of whole episodes
+    loss: float  # weighted mean of the cross-entropy, and the weighted `episode_loss` and `warning_loss`
     # see `lgmd_gym.training.offline.episode_loss`
     episode_loss: float
     warning_loss: float
@@ -142,6 +142,8 @@ class TimeToBrakeLearner:
             raise ValueError(
                 f"warning_weight {warning_weight:g} requires an episode_weight above 0; set both"
             )
+        if self.warning_weight:
+            check_warning(self.brake)
         self.bfloat16 = check_flag("bfloat16", bfloat16)
         self._seed, count = seed, check_whole("n_networks", n_networks, 1)
         given: Any = env.observation_space
