@@ -73,7 +73,13 @@ SIDE_DETECTORS = ("lgmd", *NEURONS)
 FILE = Path(str(files("lgmd_gym.training") / "all-round.yml"))
 CONFIG = TrainConfig.from_hyperparams("time-to-brake", file=FILE)
 """Training of `policy:all-round`."""
-FROM_RANDOM = {"learning_rate": 0.004, "batch_size": 1024, "start_share": 0.0, "episode_weight": 0.0}
+FROM_RANDOM = {
+    "learning_rate": 0.004,
+    "batch_size": 1024,
+    "start_share": 0.0,
+    "episode_weight": 0.0,
+    "warning_weight": 0.0,
+}
 """Changes for a training that starts from random weights."""
 FILE_SIZE = 50  # levels
 
