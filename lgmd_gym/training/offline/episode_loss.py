@@ -81,7 +81,7 @@ def _decisions_within(times: np.ndarray, above: float, below: float, reached: fl
 def episode_losses(
     logits: torch.Tensor, lengths: Sequence[int], targets: Sequence[EpisodeTarget], brake: TimeToBrakeParams
 ) -> tuple[torch.Tensor, torch.Tensor]:
-    """Return the mean losses of braking and of the warning over the episodes with such a target, 0 without.
+    """Return the mean losses of braking and of the warning over the episodes with such a target, or 0.
 
     Args:
         logits: Logits of the decisions of whole episodes, one after the other, float32, (M, actions).
@@ -91,8 +91,8 @@ def episode_losses(
     """
     signs = [target.sign for target in targets]
     return (
-        _mean_loss(braking_odds(logits, brake), lengths, [target.braking for target in targets], signs),
-        _mean_loss(
+        _logistic_loss(braking_odds(logits, brake), lengths, [target.braking for target in targets], signs),
+        _logistic_loss(
             shifted_warning_odds(logits, brake), lengths, [target.warning for target in targets], signs
         ),
     )
@@ -103,12 +103,11 @@ def braking_odds(logits: torch.Tensor, brake: TimeToBrakeParams) -> torch.Tensor
 
     They are the smaller ones of those of both conditions, with the second threshold raised or lowered to the
     first one. So they depend on the difference of the thresholds only: these can be chosen after a training.
+    With a second threshold of -50, they are those of the first condition.
     """
-    full = _odds_below(logits, brake, brake.full_s)
-    if brake.confirm_odds == -MAX_ODDS:
-        return full
     return torch.minimum(
-        full, _odds_below(logits, brake, brake.present_s) - (brake.confirm_odds - brake.full_odds)
+        _odds_below(logits, brake, brake.full_s),
+        _odds_below(logits, brake, brake.present_s) - (brake.confirm_odds - brake.full_odds),
     )
 
 
@@ -123,7 +122,7 @@ def _odds_below(logits: torch.Tensor, brake: TimeToBrakeParams, limit_s: float) 
     return logits[:, :count].logsumexp(1) - logits[:, count:].logsumexp(1)
 
 
-def _mean_loss(
+def _logistic_loss(
     odds: torch.Tensor, lengths: Sequence[int], decisions: Iterable[np.ndarray], signs: Iterable[float]
 ) -> torch.Tensor:
     """Return the mean logistic loss of the highest log odds at the decisions of each episode that has any."""
