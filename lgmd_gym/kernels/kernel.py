@@ -15,6 +15,7 @@ from functools import partial
 from typing import Any
 
 import numba
+from llvmlite.binding import Linkage
 from numba.core import config, sigutils, types
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
@@ -30,7 +31,7 @@ from lgmd_gym.kernels.compilation import lock_of_user, report_compilation
 from lgmd_gym.kernels.sources import source_stamp
 
 # Versions of numba with the internals that `Kernel` uses; with any other, `kernel` is `numba.njit`.
-_KNOWN = (0, 61) <= numba.version_info.short <= (0, 68)
+_KNOWN = (0, 62) <= numba.version_info.short <= (0, 68)
 
 
 def kernel(
@@ -195,8 +196,25 @@ class _Cache(FunctionCache):
             return None
 
 
+class _OuterLibrary(JITCodeLibrary):
+    """LLVM module of a function that Python calls, with all functions that it calls.
+
+    They are private to it. The optimizer then makes a function that is called at one place a part of its
+    caller, and removes arguments that nothing reads: a call passes an array as eleven numbers.
+    """
+
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if function.linkage == Linkage.linkonce_odr:
+                function.linkage = Linkage.internal
+        super()._optimize_final_module()
+
+
 class _InnerLibrary(JITCodeLibrary):
     """LLVM module of a function without machine code, for the modules of the functions that call it."""
+
+    def _optimize_final_module(self) -> None:
+        """Leave the module as it is: that of the function that Python calls is optimized as a whole."""
 
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
@@ -215,6 +233,8 @@ class _Lowering(NativeLowering):
 
     def run_pass(self, state: Any) -> Any:
         if not _is_inner():
+            state.library = _OuterLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+            state.library.enable_object_caching()
             return super().run_pass(state)
         state.flags.no_compile = state.flags.no_cpython_wrapper = True
         state.library = _InnerLibrary(state.targetctx.codegen(), state.func_id.func_qualname)

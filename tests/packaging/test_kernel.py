@@ -8,6 +8,7 @@ import sys
 
 import numba
 import pytest
+from llvmlite.binding import Linkage
 
 SOURCE = """
 from lgmd_gym.kernels import kernel
@@ -62,6 +63,14 @@ def test_only_the_function_that_python_calls_has_machine_code(squares):
     assert squares.square(1.5) == 2.25
     assert has_machine_code(squares.square) == [True, True]
     assert squares.tripled(2) == 12
+
+
+def test_called_functions_are_private_to_the_function_that_python_calls(squares):
+    """The optimizer can then make them a part of it."""
+    squares.tripled(3)
+    (cres,) = squares.tripled.overloads.values()
+    names = {each.name for each in cres.library.get_defined_functions() if each.linkage != Linkage.internal}
+    assert names == {cres.fndesc.llvm_func_name, cres.fndesc.llvm_cpython_wrapper_name}
 
 
 def test_exceptions_of_a_called_function_reach_python(squares):
