@@ -193,6 +193,21 @@ def copy(typingctx, source, source_index, target, target_index):
     return types.void(source, types.intp, target, types.intp), codegen
 
 
+@intrinsic
+def prefetch(typingctx, array, index):
+    """Load the cache line of array[index] of a float32 array ahead of time; the index may be out of range."""
+
+    def codegen(context, builder, signature, args):
+        pointer = pointer_to(context, builder, signature.args[0], args[0], args[1], FLOATS)
+        word = ir.IntType(32)
+        kind = ir.FunctionType(ir.VoidType(), [pointer.type, word, word, word])
+        function = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0")
+        builder.call(function, [pointer, word(1), word(3), word(1)])
+        return context.get_dummy_value()
+
+    return types.void(array, types.intp), codegen
+
+
 def repeated(builder, kind, value):
     """Emit a vector of a type of LLVM with the same value in every lane."""
     empty, index = ir.Constant(kind, ir.Undefined), ir.IntType(32)

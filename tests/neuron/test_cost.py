@@ -11,7 +11,7 @@ from lgmd_gym.kernels.simd import LANES
 from lgmd_gym.neuron.lgmd import general, kernels
 
 PAGE = " ".join((Path(__file__).parents[2] / "docs" / "neuron.md").read_text(encoding="utf-8").split())
-KERNELS = ("_at", "_replicate_sides", "_photoreceptors", "_clear_tiny", "_delayed", "_summation",
+KERNELS = ("_at", "_replicate_sides", "_photoreceptors", "_clear_tiny", "_is_still", "_delayed", "_summation",
            "_local_means", "_inhibition", "_grouping", "step")  # fmt: skip
 
 
@@ -57,6 +57,7 @@ VECTORS = {
     "select_by_sign": lambda sign, a, b: Lanes(np.where(sign.values >= 0, a.values, b.values), 1),
     "at_least": lambda a, low: Lanes(np.where(a.values >= low.values, a.values, 0), 1),
     "clear_below": lambda a, low: Lanes(np.where(np.abs(a.values) >= low.values, a.values, 0)),
+    "prefetch": lambda array, index: None,
     "total": lambda a: a.values.sum(),
     "largest": lambda a: a.values.max(),
 }
@@ -86,27 +87,29 @@ def operations_per_pixel(frames):
 
 
 def test_operations_per_pixel():
-    """71 in every frame, 8 more in rows that can pass the grouping threshold."""
+    """71 in rows with a change, 8 more in those that can pass the grouping threshold, 7 in all others."""
     still = np.full((20, 32), 127, np.uint8)
-    bar = still.copy()
-    bar[:, 14:17] = 20  # in every row
+    bar, weak = still.copy(), still.copy()
+    bar[:, 14:17], weak[:, 14:17] = 20, 126  # in every row
     frames = [still, still, bar]
     count, scalars = operations_per_pixel(frames)
     assert count == 79
-    assert operations_per_pixel([still] * 3)[0] == 71
+    assert operations_per_pixel([still, still, weak])[0] == 71
+    assert operations_per_pixel([still] * 3)[0] == 7
     neuron = LGMD((20, 32))
     response = [neuron.step(frame) for frame in frames][-1]
     assert scalars[0, 2] == pytest.approx(response.membrane_potential, abs=1e-6)  # the same computation
     assert response.membrane_potential > 0.7
     assert "71 operations per pixel" in PAGE
     assert "8 more" in PAGE
+    assert "7 in rows without a change" in PAGE
     assert f"{99 * 72 * 79 * 30 / 1e6:.0f} million operations per second" in PAGE
 
 
 def test_bytes_per_pixel():
     """Of a width without padding; the borders of P are left out."""
     height, width = 48, 64
-    p, memory, s, products, g, slots = kernels.allocate(1, (height, width))
+    p, memory, s, products, g, rows = kernels.allocate(1, (height, width))
     pixels = height * width
     previous = LGMD((height, width))._previous
     parts = {"last frame": previous.nbytes, "P": 2 * 4 * pixels, "E": memory.nbytes, "G": g.nbytes}
@@ -122,7 +125,7 @@ def test_bytes_per_pixel():
     used = sum(array.nbytes for array in kernels.allocate(1, (72, 99))) + 72 * 99
     assert f"{used / 1000:.0f} kB" in PAGE
     assert products.nbytes == 4 * pixels  # scratch memory, which the neurons of a batch share
-    assert s.nbytes + slots.nbytes < 4 * pixels
+    assert s.nbytes + rows.nbytes < 4 * pixels
 
 
 def test_bytes_per_pixel_of_the_general_kernel():

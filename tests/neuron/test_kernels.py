@@ -146,3 +146,25 @@ def test_decaying_maps_reach_zero_without_denormal_numbers():
     for values in neuron._maps[:2]:
         assert not ((values != 0) & (abs(values) < np.finfo(np.float32).tiny)).any()
     assert not neuron.layers["I"].any()
+
+
+@pytest.mark.parametrize("width", [33, 48])
+def test_rows_without_change_are_left_out_to_the_same_bits(width):
+    """Rows change at different times, at the borders and alone, decay, and change again."""
+    rng, frame = np.random.default_rng(0), natural((20, width), 1)[0]
+    neuron, every = LGMD((20, width)), LGMD((20, width))
+    *_, rows = neuron._maps
+    still = []
+    for number in range(1200):
+        frame = frame.copy()
+        moving = rng.choice(20, 2) if number % 500 < 20 else []
+        frame[moving] = rng.integers(0, 256, (len(moving), width))
+        every._maps[-1][:, kernels._DELAYED] = 1  # leaves out a 16th of the rows at most
+        assert neuron.step(frame) == every.step(frame)
+        for name, image in neuron.layers.items():
+            np.testing.assert_array_equal(image, every.layers[name], err_msg=name)
+        still.append((rows[0, kernels._DELAYED] == 0).sum())
+    assert still[0] == 20  # the first frame changes nothing
+    assert 0 < still[5] < 20
+    assert still[499] == still[999] == 20
+    assert still[520] < 20

@@ -16,8 +16,11 @@ The kernel covers ON and OFF paths without residue, the recursive delay and up t
   row below that bound cannot pass the grouping threshold and is discarded immediately.
 
 Pass 1 computes P and F. Pass 2 computes the rings with w, S, Ce, S * Ce and omega. Pass 3 computes g of the
-remaining rows with omega. Rows are padded to whole vectors of 16 pixels. Pixel (y, x) of a bordered map has
-the index `_at(y, stride) + x`; its left border is in the padding of the row above.
+remaining rows with omega. A row without any change, such as the sky of a lens that does not move, has no S:
+pass 2 leaves out rows whose P, and that of their neighbours, is 0 and whose delayed rings have decayed.
+
+Rows are padded to whole vectors of 16 pixels. Pixel (y, x) of a bordered map has the index
+`_at(y, stride) + x`; its left border is in the padding of the row above.
 """
 
 import math
@@ -36,6 +39,7 @@ from lgmd_gym.kernels.simd import (
     madd,
     magnitude,
     maximum,
+    prefetch,
     select_by_sign,
     splat,
     store,
@@ -50,6 +54,10 @@ from lgmd_gym.neuron.scalars import feed_forward, fire
 _TINY = np.float32(1e-30)
 # Each frame clears the tiny values of every 16th row.
 _CLEAR_INTERVAL = 16
+# Memories this many vectors ahead are loaded early: processors stop at the borders of pages.
+_AHEAD = 16
+# Rows of the state of a neuron's rows, see `allocate`.
+_SLOT, _GROUPED, _CHANGED, _DELAYED = 0, 1, 2, 3
 # G below this is set to 0. Passing values are >= t_de / c_de (30), and K does not depend on this map.
 _G_FLOOR = 1e-3
 
@@ -73,8 +81,8 @@ def _replicate_sides(image, start, w) -> None:
 
 
 @kernel(exact=True, arrays=True)
-def _photoreceptors(frame, previous, at, width, weight, now, last, h, w, stride, const) -> float:
-    """Pass 1: compute P (eq. 1) and return the sum of |P|.
+def _photoreceptors(frame, previous, at, width, weight, now, last, rows, h, w, stride, const) -> float:
+    """Pass 1: compute P (eq. 1), note which rows of it are not 0, and return the sum of |P|.
 
     P overwrites the P of two frames ago in `now`, and the frame overwrites `previous`. Both frames are flat.
     The region starts at frame[at]; its rows are `width` apart.
@@ -105,6 +113,7 @@ def _photoreceptors(frame, previous, at, width, weight, now, last, h, w, stride,
             now[i + x] = p
             row_total += abs(p)
             previous[target + x] = frame[source + x]
+        rows[_CHANGED, y] = row_total != np.float32(0)
         sum_p += row_total
         _replicate_sides(now, i, w)
     for x in range(-1, w + 1):
@@ -114,11 +123,28 @@ def _photoreceptors(frame, previous, at, width, weight, now, last, h, w, stride,
 
 
 @kernel(exact=True, arrays=True)
-def _clear_tiny(values, first, last) -> None:
-    """Set tiny values to 0."""
+def _clear_tiny(values, first, last):
+    """Set tiny values to 0 and return whether others are left."""
     tiny = splat(_TINY)
+    most = splat(np.float32(0))
     for i in range(first, last, LANES):
-        store(values, i, clear_below(load(values, i), tiny))
+        value = clear_below(load(values, i), tiny)
+        store(values, i, value)
+        most = maximum(most, magnitude(value))
+    return largest(most) > np.float32(0)
+
+
+@kernel(exact=True, arrays=True)
+def _is_still(memory, rows, y, h, columns, row):
+    """Return whether S of row y is 0: no change in it and its neighbours, nor delayed changes.
+
+    Tiny values of every 16th row are set to 0.
+    """
+    size = columns * 6
+    if rows[_DELAYED, y] != 0 and (y + int(row[sc.AGE])) % _CLEAR_INTERVAL == 0:
+        rows[_DELAYED, y] = _clear_tiny(memory, y * size, (y + 1) * size)
+    above, below = rows[_CHANGED, max(y - 1, 0)], rows[_CHANGED, min(y + 1, h - 1)]
+    return rows[_DELAYED, y] == 0 and above == 0 and rows[_CHANGED, y] == 0 and below == 0
 
 
 @kernel(exact=True, inline=True, arrays=True)
@@ -145,6 +171,8 @@ def _summation(p, memory, s, y, target, blocks, stride, warm, weight, const) -> 
     zero = splat(np.float32(0))
     for b in range(blocks):
         i, m = _at(y + 1, stride) + b * LANES, (y * blocks + b) * 6 * LANES
+        for k in range(6):  # needed where the memories of many neurons exceed the cache
+            prefetch(memory, m + (_AHEAD * 6 + k) * LANES)
         above, below = i - stride, i + stride
         centre, left, right = load(p, i), load(p, i - 1), load(p, i + 1)
         up, down = load(p, above), load(p, below)
@@ -183,43 +211,54 @@ def _local_means(s, top, middle, bottom, sums, products, target, w):
 
 
 @kernel(exact=True, arrays=True)
-def _inhibition(p, memory, s, products, slots, h, w, warm, row, const) -> np.floating:
+def _inhibition(p, memory, s, products, rows, h, w, warm, row, const) -> np.floating:
     """Pass 2: compute S * Ce of the rows that can pass the threshold, and return the grouping scale omega."""
     blocks = -(-w // LANES)
     columns, stride = blocks * LANES, (blocks + 1) * LANES
     delta, scale = np.float32(const[sc.DELTA_C]), np.float32(1.0 / const[sc.C_W])
     threshold = np.float32(const[sc.T_G])
     omega, used, sums = delta, 0, 3 * columns + LANES
+    # Whether row y, the one above it and the one above that are still.
+    still = still_1 = still_2 = True
     for y in range(h + 1):
+        still_2, still_1 = still_1, still
         if y < h:
             target = y % 3 * columns
-            if (y + int(row[sc.AGE])) % _CLEAR_INTERVAL == 0:
-                _clear_tiny(memory, y * columns * 6, (y + 1) * columns * 6)
-            _summation(p, memory, s, y, target, blocks, stride, warm, row[sc.W], const)
-            for x in range(w, columns):
-                s[target + x] = np.float32(0)
+            still = _is_still(memory, rows, y, h, columns, row)
+            if still:
+                for x in range(0, columns, LANES):
+                    store(s, target + x, splat(np.float32(0)))
+            else:
+                rows[_DELAYED, y] = 1
+                _summation(p, memory, s, y, target, blocks, stride, warm, row[sc.W], const)
+                for x in range(w, columns):
+                    s[target + x] = np.float32(0)
         if y == 0:
+            still_1 = still
             continue
         # Row y - 1 has both neighbours now; edges are replicated.
+        if still and still_1 and still_2 and threshold > np.float32(0):
+            rows[_SLOT, y - 1] = -1
+            continue
         top, middle, bottom = max(y - 2, 0) % 3 * columns, (y - 1) % 3 * columns, min(y, h - 1) % 3 * columns
         mean, product = _local_means(s, top, middle, bottom, sums, products, used * columns, w)
         omega = max(omega, delta + scale * mean)
         passes = product >= threshold * omega
-        slots[0, y - 1] = used if passes else -1
+        rows[_SLOT, y - 1] = used if passes else -1
         used += 1 if passes else 0
     return omega
 
 
 @kernel(exact=True, arrays=True)
-def _grouping(products, g, slots, h, columns, omega, gain, t_g) -> float:
+def _grouping(products, g, rows, h, columns, omega, gain, t_g) -> float:
     """Pass 3: update G (eq. 9) in rows where g or G is not 0, and return the sum of g (Yue & Rind)."""
     sum_g = 0.0
     zero = splat(np.float32(0))
     threshold, scale = splat(np.float32(t_g * omega)), splat(np.float32(1.0 / omega))
     v_gain, v_floor = splat(np.float32(gain)), splat(np.float32(_G_FLOOR))
     for y in range(h):
-        slot = slots[0, y]
-        if slot < 0 and slots[1, y] == 0:
+        slot = rows[_SLOT, y]
+        if slot < 0 and rows[_GROUPED, y] == 0:
             continue
         row_sum = row_max = zero
         for x in range(0, columns, LANES):
@@ -228,14 +267,14 @@ def _grouping(products, g, slots, h, columns, omega, gain, t_g) -> float:
             filtered = at_least(madd(v_gain, new - old, old), v_floor)
             store(g, y * columns + x, filtered)
             row_sum, row_max = row_sum + new, maximum(row_max, filtered)
-        slots[1, y] = largest(row_max) > np.float32(0)
+        rows[_GROUPED, y] = largest(row_max) > np.float32(0)
         sum_g += total(row_sum)
     return sum_g
 
 
 @kernel(exact=True, arrays=True)
 def step(
-    first, last, frames, previous, y0, x0, weight, active, scalars, const, p, memory, s, products, g, slots
+    first, last, frames, previous, y0, x0, weight, active, scalars, const, p, memory, s, products, g, rows
 ) -> None:  # fmt: skip
     """Step the active neurons among first..last-1.
 
@@ -257,13 +296,13 @@ def step(
         now, before = p[n, int(row[sc.AGE]) % 2], p[n, 1 - int(row[sc.AGE]) % 2]
         warm = const[sc.WARM_START] > 0.0 and row[sc.AGE] == 1.0
         sum_p = _photoreceptors(
-            frames[n].ravel(), previous[n].ravel(), y0 * width + x0, width, weight.ravel(), now, before, h, w,
-            columns + LANES, const,
+            frames[n].ravel(), previous[n].ravel(), y0 * width + x0, width, weight.ravel(), now, before,
+            rows[n], h, w, columns + LANES, const,
         )  # fmt: skip
         feed_forward(row, const, sum_p)
-        omega = _inhibition(now, memory[n], s[first], products[first], slots[n], h, w, warm, row, const)
+        omega = _inhibition(now, memory[n], s[first], products[first], rows[n], h, w, warm, row, const)
         gain = row[sc.GAIN_G]
-        fire(row, const, _grouping(products[first], g[n], slots[n], h, columns, omega, gain, const[sc.T_G]))
+        fire(row, const, _grouping(products[first], g[n], rows[n], h, columns, omega, gain, const[sc.T_G]))
 
 
 def allocate(num: int, shape: tuple[int, int]) -> tuple[Map, ...]:
@@ -278,7 +317,8 @@ def allocate(num: int, shape: tuple[int, int]) -> tuple[Map, ...]:
         s: The last three rows of S, and their column sums with a border, (N, 4 * columns + 32).
         products: S * Ce of the rows that can pass the grouping threshold, (N, H * columns).
         g: G, (N, H * columns).
-        slots: Per row, the index of its S * Ce or -1, and whether its G is not 0, (N, 2, H) int32.
+        rows: Per row, the index of its S * Ce or -1, and whether its G, its P and its delayed rings are not
+            0, (N, 4, H) int32.
     """
     h, w = shape
     columns = -(-w // LANES) * LANES
@@ -286,7 +326,7 @@ def allocate(num: int, shape: tuple[int, int]) -> tuple[Map, ...]:
         (num, 2, LANES + (h + 2) * (columns + LANES)), (num, h * columns * 6), (num, 4 * columns + 2 * LANES),
         (num, h * columns), (num, h * columns),
     )  # fmt: skip
-    return *(_aligned_zeros(size) for size in sizes), np.zeros((num, 2, h), np.int32)
+    return *(_aligned_zeros(size) for size in sizes), np.zeros((num, 4, h), np.int32)
 
 
 def shifted_views(maps: tuple[Map, ...], height: int) -> tuple[NDArray[np.float32], ...]:
@@ -315,9 +355,9 @@ def _aligned_zeros(shape: tuple[int, ...]) -> NDArray[np.float32]:
     return buffer[skip : skip + size].reshape(shape)
 
 
-def layers(scalars, const, p, memory, s, products, g, slots) -> dict[str, NDArray[np.float32]]:
+def layers(scalars, const, p, memory, s, products, g, rows) -> dict[str, NDArray[np.float32]]:
     """Return P, E, I, S and G of the last frame, each of shape (N, H, columns)."""
-    num, h = len(scalars), slots.shape[2]
+    num, h = len(scalars), rows.shape[2]
     current = (scalars[:, sc.AGE].astype(int) - 1) % 2
     bordered = p[np.arange(num), current, LANES:].reshape(num, h + 2, -1)
     photo = bordered[:, 1:-1, :-LANES]
