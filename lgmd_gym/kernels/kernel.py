@@ -199,13 +199,14 @@ class _Cache(FunctionCache):
 class _OuterLibrary(JITCodeLibrary):
     """LLVM module of a function that Python calls, with all functions that it calls.
 
-    They are private to it. The optimizer then makes a function that is called at one place a part of its
-    caller, and removes arguments that nothing reads: a call passes an array as eleven numbers.
+    They are private to it, except those with fixed names, which numba shares between modules. The optimizer
+    then makes a function that is called at one place a part of its caller, and removes arguments that nothing
+    reads: a call passes an array as eleven numbers.
     """
 
     def _optimize_final_module(self) -> None:
         for function in self._final_module.functions:
-            if function.linkage == Linkage.linkonce_odr:
+            if function.linkage == Linkage.linkonce_odr and function.name.startswith("_Z"):
                 function.linkage = Linkage.internal
         super()._optimize_final_module()
 

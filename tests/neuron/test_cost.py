@@ -11,8 +11,8 @@ from lgmd_gym.kernels.simd import LANES
 from lgmd_gym.neuron.lgmd import general, kernels
 
 PAGE = " ".join((Path(__file__).parents[2] / "docs" / "neuron.md").read_text(encoding="utf-8").split())
-KERNELS = ("_at", "_replicate_sides", "_photoreceptors", "_clear_tiny", "_is_still", "_delayed", "_summation",
-           "_local_means", "_inhibition", "_grouping", "step")  # fmt: skip
+KERNELS = ("_at", "_replicate_sides", "_photoreceptors", "_clear_tiny", "_clear_row", "_is_still",
+           "_delayed", "_summation", "_local_means", "_inhibition", "_grouping", "step")  # fmt: skip
 
 
 class Lanes:

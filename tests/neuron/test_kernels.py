@@ -168,3 +168,18 @@ def test_rows_without_change_are_left_out_to_the_same_bits(width):
     assert 0 < still[5] < 20
     assert still[499] == still[999] == 20
     assert still[520] < 20
+
+
+@pytest.mark.parametrize("change", [1.0, 1e-3])
+def test_the_weakest_change_of_a_still_view_counts(change):
+    still = np.full((9, 20), 100.0, np.float32)
+    touched = still.copy()
+    touched[4, 10] += change
+    neuron = LGMD((9, 20))
+    for _ in range(3):
+        neuron.step(still)
+    assert not neuron.layers["S"].any()
+    neuron.step(touched)
+    *_, rows = neuron._maps
+    assert (rows[0, kernels._DELAYED] != 0).nonzero()[0].tolist() == [3, 4, 5]
+    assert neuron.layers["S"][4, 10] == pytest.approx(change, rel=0.5)

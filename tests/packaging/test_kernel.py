@@ -26,6 +26,14 @@ def square_sum(x, y):
 @kernel(exact=True, arrays=True)
 def tripled(x):
     return square_sum(x, x) + square(x)
+
+@kernel(exact=True, arrays=True)
+def fibonacci(n):
+    return n if n < 2 else fibonacci(n - 1) + fibonacci(n - 2)
+
+@kernel(exact=True, arrays=True)
+def fibonacci_sum(n):
+    return fibonacci(n) + 1
 """
 CALLS = "import squares as s; print(s.{}, len(s.square_sum.stats.cache_hits), len(s.square.stats.cache_hits))"
 
@@ -66,11 +74,13 @@ def test_only_the_function_that_python_calls_has_machine_code(squares):
 
 
 def test_called_functions_are_private_to_the_function_that_python_calls(squares):
-    """The optimizer can then make them a part of it."""
-    squares.tripled(3)
-    (cres,) = squares.tripled.overloads.values()
-    names = {each.name for each in cres.library.get_defined_functions() if each.linkage != Linkage.internal}
-    assert names == {cres.fndesc.llvm_func_name, cres.fndesc.llvm_cpython_wrapper_name}
+    """The optimizer can then make them a part of it; a function that calls itself twice remains one."""
+    assert squares.fibonacci_sum(10) == 56
+    (cres,) = squares.fibonacci_sum.overloads.values()
+    linkages = {each.name: each.linkage for each in cres.library.get_defined_functions()}
+    public = {name for name, linkage in linkages.items() if linkage != Linkage.internal}
+    assert public == {cres.fndesc.llvm_func_name, cres.fndesc.llvm_cpython_wrapper_name}
+    assert any("fibonacci" in name for name in linkages.keys() - public)
 
 
 def test_exceptions_of_a_called_function_reach_python(squares):

@@ -52,9 +52,9 @@ from lgmd_gym.neuron.scalars import feed_forward, fire
 
 # Filter memories below this are set to 0, before they become slow denormal numbers.
 _TINY = np.float32(1e-30)
-# Each frame clears the tiny values of every 16th row.
+# Each frame clears the tiny values of every 16th row that has delayed rings.
 _CLEAR_INTERVAL = 16
-# Memories this many vectors ahead are loaded early: processors stop at the borders of pages.
+# Memories this many vectors ahead are loaded early: processors stop loading ahead at the border of a page.
 _AHEAD = 16
 # Rows of the state of a neuron's rows, see `allocate`.
 _SLOT, _GROUPED, _CHANGED, _DELAYED = 0, 1, 2, 3
@@ -135,14 +135,16 @@ def _clear_tiny(values, first, last):
 
 
 @kernel(exact=True, arrays=True)
-def _is_still(memory, rows, y, h, columns, row):
-    """Return whether S of row y is 0: no change in it and its neighbours, nor delayed changes.
-
-    Tiny values of every 16th row are set to 0.
-    """
+def _clear_row(memory, rows, y, columns, row) -> None:
+    """Clear tiny values of the delayed rings of a row, if it has its turn, and note if others are left."""
     size = columns * 6
     if rows[_DELAYED, y] != 0 and (y + int(row[sc.AGE])) % _CLEAR_INTERVAL == 0:
         rows[_DELAYED, y] = _clear_tiny(memory, y * size, (y + 1) * size)
+
+
+@kernel(exact=True, arrays=True)
+def _is_still(rows, y, h):
+    """Return whether S of row y is 0: no change in it and its neighbours, nor delayed changes."""
     above, below = rows[_CHANGED, max(y - 1, 0)], rows[_CHANGED, min(y + 1, h - 1)]
     return rows[_DELAYED, y] == 0 and above == 0 and rows[_CHANGED, y] == 0 and below == 0
 
@@ -218,13 +220,14 @@ def _inhibition(p, memory, s, products, rows, h, w, warm, row, const) -> np.floa
     delta, scale = np.float32(const[sc.DELTA_C]), np.float32(1.0 / const[sc.C_W])
     threshold = np.float32(const[sc.T_G])
     omega, used, sums = delta, 0, 3 * columns + LANES
-    # Whether row y, the one above it and the one above that are still.
+    # Whether row y, the one above it and the one above that are still; a row above the first one is as it is.
     still = still_1 = still_2 = True
     for y in range(h + 1):
         still_2, still_1 = still_1, still
         if y < h:
             target = y % 3 * columns
-            still = _is_still(memory, rows, y, h, columns, row)
+            _clear_row(memory, rows, y, columns, row)
+            still = _is_still(rows, y, h)
             if still:
                 for x in range(0, columns, LANES):
                     store(s, target + x, splat(np.float32(0)))
@@ -317,8 +320,8 @@ def allocate(num: int, shape: tuple[int, int]) -> tuple[Map, ...]:
         s: The last three rows of S, and their column sums with a border, (N, 4 * columns + 32).
         products: S * Ce of the rows that can pass the grouping threshold, (N, H * columns).
         g: G, (N, H * columns).
-        rows: Per row, the index of its S * Ce or -1, and whether its G, its P and its delayed rings are not
-            0, (N, 4, H) int32.
+        rows: Per row, the index of its S * Ce or -1; whether its G and its P are not 0; and whether its
+            delayed rings may be other than 0, (N, 4, H) int32.
     """
     h, w = shape
     columns = -(-w // LANES) * LANES
