@@ -199,9 +199,10 @@ class _Cache(FunctionCache):
 class _OuterLibrary(JITCodeLibrary):
     """LLVM module of a function that Python calls, with all functions that it calls.
 
-    They are private to it, except those with fixed names, which numba shares between modules. The optimizer
-    then makes a function that is called at one place a part of its caller, and removes arguments that nothing
-    reads: a call passes an array as eleven numbers.
+    They are private to it, except those with fixed names, such as the destructors of lists: numba shares them
+    between modules, and functions compiled for threads crash otherwise. The optimizer then makes a function
+    that is called at one place a part of its caller, and removes arguments that nothing reads: a call passes
+    an array as eleven numbers.
     """
 
     def _optimize_final_module(self) -> None:

@@ -34,6 +34,10 @@ def fibonacci(n):
 @kernel(exact=True, arrays=True)
 def fibonacci_sum(n):
     return fibonacci(n) + 1
+
+@kernel(exact=True, arrays=True)
+def lists(n):
+    return [[i] for i in range(n)]
 """
 CALLS = "import squares as s; print(s.{}, len(s.square_sum.stats.cache_hits), len(s.square.stats.cache_hits))"
 
@@ -81,6 +85,15 @@ def test_called_functions_are_private_to_the_function_that_python_calls(squares)
     public = {name for name, linkage in linkages.items() if linkage != Linkage.internal}
     assert public == {cres.fndesc.llvm_func_name, cres.fndesc.llvm_cpython_wrapper_name}
     assert any("fibonacci" in name for name in linkages.keys() - public)
+
+
+def test_destructors_of_lists_stay_public(squares):
+    """Functions compiled for threads crash otherwise."""
+    assert squares.lists(2) == [[0], [1]]
+    (cres,) = squares.lists.overloads.values()
+    destructors = [each for each in cres.library.get_defined_functions() if each.name.startswith(".dtor.")]
+    assert destructors
+    assert all(each.linkage == Linkage.linkonce_odr for each in destructors)
 
 
 def test_exceptions_of_a_called_function_reach_python(squares):

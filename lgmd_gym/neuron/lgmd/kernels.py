@@ -220,7 +220,7 @@ def _inhibition(p, memory, s, products, rows, h, w, warm, row, const) -> np.floa
     delta, scale = np.float32(const[sc.DELTA_C]), np.float32(1.0 / const[sc.C_W])
     threshold = np.float32(const[sc.T_G])
     omega, used, sums = delta, 0, 3 * columns + LANES
-    # Whether row y, the one above it and the one above that are still; a row above the first one is as it is.
+    # Whether row y, the one above it and the one above that are still; rows above the first one are.
     still = still_1 = still_2 = True
     for y in range(h + 1):
         still_2, still_1 = still_1, still
@@ -237,7 +237,6 @@ def _inhibition(p, memory, s, products, rows, h, w, warm, row, const) -> np.floa
                 for x in range(w, columns):
                     s[target + x] = np.float32(0)
         if y == 0:
-            still_1 = still
             continue
         # Row y - 1 has both neighbours now; edges are replicated.
         if still and still_1 and still_2 and threshold > np.float32(0):
