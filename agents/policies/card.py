@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar, cast
 from lgmd_gym.agents.base import FPS
 from lgmd_gym.agents.policies.evidence import TimeToBrakeParams
 from lgmd_gym.agents.policies.features import NORMALIZER_SUFFIX, FeatureConfig, save_normalizer
-from lgmd_gym.agents.policies.network import WEIGHTS, NetworkSpec, describe_network
+from lgmd_gym.agents.policies.network import NetworkSpec, describe_network
+from lgmd_gym.agents.policies.weights import WEIGHTS
 from lgmd_gym.aliases import Arguments, Config, Values
 from lgmd_gym.errors import (
     check_items,

@@ -2,10 +2,7 @@
 # Not strict: torch and stable-baselines3 state few types.
 """`NetworkSpec`: the network of a policy as plain values, so that loading it executes no code of the file."""
 
-import io
 import json
-import zipfile
-from collections.abc import Mapping
 from dataclasses import MISSING
 from itertools import pairwise
 from math import prod
@@ -15,22 +12,27 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from gymnasium import spaces
 
+from lgmd_gym.agents.policies.dense import (
+    ACTIVATIONS,
+    Linear,
+    Step,
+    check_shapes,
+    shapes_of,
+    side_by_side,
+)
 from lgmd_gym.agents.policies.features import FRAME
-from lgmd_gym.agents.policies.kernels import affine
+from lgmd_gym.agents.policies.weights import weights_file
 from lgmd_gym.aliases import Arguments
 from lgmd_gym.errors import check_items, check_keys, check_known, check_type, check_whole
 from lgmd_gym.fields import Record, record, text, value
-from lgmd_gym.processes.inputs import check_members
 
 if TYPE_CHECKING:
     import torch
     from stable_baselines3.common.base_class import BaseAlgorithm
     from stable_baselines3.common.policies import BasePolicy
 
-WEIGHTS = "policy.pth"  # member of every model file of stable-baselines3
 MAX_UNITS = 10_000  # of a layer or an input, so that a damaged card does not fill the memory
 MAX_WEIGHTS = 50_000_000  # of a network, about
-MAX_BYTES = 1_000_000_000  # of the unpacked weights
 PLAIN_KWARGS = (
     "net_arch", "activation_fn", "ortho_init", "use_sde", "log_std_init", "full_std", "use_expln",
     "clip_mean", "squash_output", "features_extractor_kwargs", "share_features_extractor", "normalize_images",
@@ -128,20 +130,9 @@ class NetworkSpec(Record):
         """
         import torch
 
-        with zipfile.ZipFile(path) as file:
-            check_members(file, MAX_BYTES)
-            data = io.BytesIO(file.read(WEIGHTS))
-        if zipfile.is_zipfile(data):
-            with zipfile.ZipFile(data) as inside:
-                check_members(inside, MAX_BYTES)
-        data.seek(0)
-        weights = torch.load(data, map_location="cpu", weights_only=True)
+        weights = torch.load(weights_file(path), map_location="cpu", weights_only=True)
         network = self.build(algo, num_actions)
-        expected, given = _shapes(network.state_dict()), _shapes(weights)
-        for name in [*expected, *given]:
-            there, here = given.get(name), expected.get(name)
-            if there != here:
-                raise ValueError(f"the weights {name} have the shape {there}, those of the card {here}")
+        check_shapes(shapes_of(network.state_dict()), shapes_of(weights))
         network.load_state_dict(weights)
         network.set_training_mode(False)
         return network
@@ -179,68 +170,35 @@ def dense_layers(network: Any) -> "torch.nn.Sequential | None":
     return None
 
 
-class DenseNetwork:
-    """Values of the actions of a network of dense layers.
+def dense_steps(layers: "torch.nn.Sequential") -> list[Step] | None:
+    """Return layers as steps of `DenseNetwork`, with copies of the weights; None for others than it has."""
+    from torch import nn
 
-    Layers of `Linear`, `ReLU` and `Tanh` are calculated without torch, which takes half of torch's time for
-    one environment. Unlike those of torch, their values do not depend on the number of environments.
+    functions = {getattr(nn, name): function for name, function in ACTIVATIONS.items()}
+    if not all(type(layer) in (nn.Linear, *functions) for layer in layers):
+        return None
+    return [
+        Linear.of(layer.weight.detach().numpy(), layer.bias.detach().numpy())
+        if isinstance(layer, nn.Linear)
+        else functions[type(layer)]
+        for layer in layers
+    ]
+
+
+def layer_values(
+    layers: "torch.nn.Sequential", names: tuple[str, ...], inputs: dict[str, np.ndarray]
+) -> np.ndarray:
+    """Return the values of the actions of `dense_layers`, float32, shape (N, actions).
 
     Args:
-        layers: See `dense_layers`. The weights are copied.
+        layers: Layers that `DenseNetwork` does not have.
         names: Names of the inputs, in the order of the network.
-
-    Attributes:
-        independent: Whether values do not depend on the number of environments.
+        inputs: Inputs by name, arrays of shape (N, …).
     """
+    import torch
 
-    def __init__(self, layers: "torch.nn.Sequential", names: tuple[str, ...]) -> None:
-        from torch import nn
-
-        self._layers, self._names = layers, names
-        functions = {nn.ReLU: _rectify, nn.Tanh: np.tanh}
-        self.independent = all(type(layer) in (nn.Linear, *functions) for layer in layers)
-        self._steps: list[tuple[np.ndarray, np.ndarray] | Any] = []
-        for layer in layers if self.independent else ():
-            if isinstance(layer, nn.Linear):
-                weights, bias = layer.weight.detach().numpy(), layer.bias.detach().numpy()
-                self._steps.append((weights.T.copy(), bias.copy()))
-            else:
-                self._steps.append(functions[type(layer)])
-
-    def __call__(self, inputs: dict[str, np.ndarray]) -> np.ndarray:
-        """Return the values of the actions, float32, shape (N, actions).
-
-        Args:
-            inputs: Inputs by name, arrays of shape (N, …).
-
-        Raises:
-            ValueError: For another number of inputs than that of the network. Kernels do not check it.
-        """
-        flat = [inputs[name].reshape(len(inputs[name]), -1) for name in self._names]
-        values = np.ascontiguousarray(np.concatenate(flat, axis=1, dtype=np.float32))
-        if not self.independent:
-            import torch
-
-            with torch.inference_mode():
-                return self._layers(torch.from_numpy(values)).numpy()
-        for step in self._steps:
-            if isinstance(step, tuple):
-                if values.shape[1] != len(step[0]):
-                    raise ValueError(
-                        f"the policy requires {len(step[0])} inputs, got {values.shape[1]}; compare the "
-                        "cameras and the history of its card with those of its training"
-                    )
-                out = np.empty((len(values), len(step[1])), np.float32)
-                affine(values, *step, out)
-                values = out
-            else:
-                step(values, out=values)
-        return values
-
-
-def _rectify(values: np.ndarray, out: np.ndarray) -> None:
-    """Replace negative values by 0."""
-    np.maximum(values, np.float32(0.0), out=out)
+    with torch.inference_mode():
+        return layers(torch.from_numpy(side_by_side(inputs, names))).numpy()
 
 
 def describe_network(model: "BaseAlgorithm") -> NetworkSpec | None:
@@ -267,7 +225,7 @@ def describe_network(model: "BaseAlgorithm") -> NetworkSpec | None:
         return None
     same_types = all(space.dtype == inputs[name].dtype for name, space in spec.observation_space.items())
     same_actions = num_actions is not None or model.action_space == _actions(None)
-    same_weights = _shapes(built.state_dict()) == _shapes(model.policy.state_dict())
+    same_weights = shapes_of(built.state_dict()) == shapes_of(model.policy.state_dict())
     return spec if same_types and same_actions and same_weights else None
 
 
@@ -295,7 +253,3 @@ def _check_units(value: object) -> None:
             _check_units(item)
     elif isinstance(value, int | float) and not abs(value) <= MAX_UNITS:
         raise ValueError(f"numbers of policy_kwargs must be at most {MAX_UNITS}, got {value}")
-
-
-def _shapes(weights: "Mapping[str, torch.Tensor]") -> dict[str, tuple[int, ...]]:
-    return {name: tuple(value.shape) for name, value in weights.items()}

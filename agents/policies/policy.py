@@ -1,16 +1,18 @@
 """`Policy`: a stable-baselines3 model as an agent."""
 
 import copy
-from collections.abc import Sequence
-from functools import partial
+from collections.abc import Callable, Generator, Sequence
+from contextlib import contextmanager
+from functools import cached_property, partial
 from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 
 from lgmd_gym.agents.base import FPS, Infos, Observations, StagedAgent, State
 from lgmd_gym.agents.policies.card import PolicyCard, policy_card
+from lgmd_gym.agents.policies.dense import DenseNetwork, Step, load_steps, with_margin
 from lgmd_gym.agents.policies.features import (
     FRAME,
     SCALES,
@@ -21,7 +23,7 @@ from lgmd_gym.agents.policies.features import (
     check_zone_shape,
     load_normalizer,
 )
-from lgmd_gym.agents.policies.network import DenseNetwork, dense_layers
+from lgmd_gym.agents.policies.network import dense_layers, dense_steps, layer_values
 from lgmd_gym.agents.stages import Evidence
 from lgmd_gym.errors import check_path, check_text, check_within, shown, unknown_name
 from lgmd_gym.processes.extras import missing_extra
@@ -39,6 +41,10 @@ MAX_MARGIN = 20.0  # of log odds; the sensible range is about -4 to 4
 SAFE_LEAD = 1e-3
 FADE_S = 0.5  # time for which the car may decelerate after the agent released the brake
 DRIVER_HOLD_S = 0.3  # time for which a braking driver counts as such: decelerations fluctuate
+
+
+ActionValues: TypeAlias = Callable[[dict[str, np.ndarray]], np.ndarray | None]
+"""Function from inputs of shape (N, …) to values of the actions, shape (N, actions); None without values."""
 
 
 class PolicyInputs(Protocol):
@@ -111,7 +117,10 @@ class Policy(StagedAgent):
     The file is a model of stable-baselines3 with a card (`PolicyCard`), inside it or beside it: the cameras,
     features and demands. With a card that describes the network, as of `lgmd-gym train`, loading reads the
     weights only. Other files are unpickled, which can execute any code: load only those that you trust.
-    Loading sets the number of PyTorch's threads in the process to 1, see `torch.set_num_threads`.
+
+    A described network of dense layers from vectors to discrete actions, as `all-round`, is loaded without
+    PyTorch. Other networks require the extra `train`, and loading them sets the number of PyTorch's threads
+    in the process to 1, see `torch.set_num_threads`.
 
     Args:
         path: Zip file, or name of a policy in this package.
@@ -122,13 +131,11 @@ class Policy(StagedAgent):
     Attributes:
         card: The card.
         features: Inputs of the policy and its decision rate.
-        network: The policy of stable-baselines3, a `BasePolicy`, whose bias includes the margin. Decisions
-            use a copy of most networks, see `DenseNetwork`: a change of these weights has no effect on them.
 
     Raises:
         ValueError: If the file cannot be read or has no card, if the card has other fields or columns than
-            the inputs require, if stable-baselines3 is not installed, or for a margin that is out of range or
-            not supported.
+            the inputs require, if the network requires stable-baselines3 and it is not installed, or for a
+            margin that is out of range or not supported.
     """
 
     name = "policy"
@@ -136,38 +143,62 @@ class Policy(StagedAgent):
     def __init__(self, path: str, margin: float = 0.0) -> None:
         self.name = f"policy:{check_text('path', path)}"
         check_within("margin", margin, -MAX_MARGIN, MAX_MARGIN)
-        file = find_policy(path)
-        self.card = policy_card(file)
-        _check_fields(file, self.card)
-        self.network = load_network(file, self.card)
-        names = tuple(getattr(self.network.observation_space, "spaces", ()))
-        self._check_network(file, names)
+        file = self._file = find_policy(path)
+        card = self.card = policy_card(file)
+        _check_fields(file, card)
         self._margin = margin
-        if self.card.brake is not None:
-            self.brake = self.card.brake
-        elif margin != 0.0:
-            self._subtract(margin)
+        steps = _described_steps(file, card)
+        if steps is None or card.network is None:
+            space, num_actions = self.network.observation_space, getattr(self.network.action_space, "n", None)
+        else:
+            space, num_actions = card.network.observation_space, card.num_actions
+        self._names: tuple[str, ...] = tuple(getattr(space, "spaces", ()))
+        self._check_network(space, num_actions)
+        if card.brake is not None:
+            self.brake = card.brake
+        elif margin != 0.0 and steps is not None:
+            steps = with_margin(steps, self._braking_action(card.algo.lower() != "dqn"), margin)
         if margin != 0.0:
             self.name += f":margin={margin:.12g}"
-        raw = FeatureConfig(inputs=names, history=1, repeat=1, shrink=1)
-        self.features = raw if self.card.features is None else self.card.features
-        name = self.card.vec_normalize
+        raw = FeatureConfig(inputs=self._names, history=1, repeat=1, shrink=1)
+        self.features = raw if card.features is None else card.features
+        name = card.vec_normalize
         self._normalizer = None if name is None else load_normalizer(file.parent / name)
-        dense = dense_layers(self.network)
-        self._values = partial(action_values, self.network) if dense is None else DenseNetwork(dense, names)
-        self._independent = isinstance(self._values, DenseNetwork) and self._values.independent
+        if steps is None:
+            self._values: ActionValues = _torch_values(self.network, self._names)
+        else:
+            self._values = DenseNetwork(steps, self._names)
+        self._independent = isinstance(self._values, DenseNetwork)
         super().__init__()
 
-    def _check_network(self, file: Path, names: tuple[str, ...]) -> None:
-        """Raise ValueError unless the inputs, cameras and actions of the network are those of the card."""
-        card, space = self.card, self.network.observation_space
+    @cached_property
+    def network(self) -> Any:
+        """The policy of stable-baselines3, a `BasePolicy`, whose bias includes the margin.
+
+        It is loaded when it is first read, which requires the extra `train`. Decisions do not use that of
+        most policies, see `DenseNetwork`: a change of its weights has no effect on them.
+
+        Raises:
+            ValueError: If stable-baselines3 is not installed.
+        """
+        network = load_network(self._file, self.card)
+        if self._margin != 0.0 and self.card.brake is None:
+            layer = getattr(network, "action_net", None)
+            action = self._braking_action(layer is not None)
+            if layer is not None:
+                layer.bias.data[action] -= self._margin
+        return network
+
+    def _check_network(self, space: Any, num_actions: int | None) -> None:
+        """Raise ValueError unless inputs, cameras and actions of the network are those of the card."""
+        card, names = self.card, self._names
         expected = set(names) & set(RAW_INPUTS) if card.features is None else set(card.features.inputs)
-        actions = getattr(self.network.action_space, "n", None)
         faults: list[str] = []
         if set(names) != expected or not names:
             faults.append(f"inputs {', '.join(names) or space} instead of {', '.join(sorted(expected))}")
-        if actions != card.num_actions:
-            faults.append(f"{actions or 'continuous'} actions instead of {card.num_actions or 'continuous'}")
+        if num_actions != card.num_actions:
+            given, required = num_actions or "continuous", card.num_actions or "continuous"
+            faults.append(f"{given} actions instead of {required}")
         for name in (item for item in names if item in ZONE_INPUTS):
             if space[name].shape != (ZONE_INPUTS[name].size,):
                 faults.append(f"{space[name].shape[0]} values of {name} instead of {ZONE_INPUTS[name].size}")
@@ -176,19 +207,19 @@ class Policy(StagedAgent):
             faults += [f"{cameras[0]} cameras instead of {cameras[1]}"] if cameras[0] != cameras[1] else []
         if faults:
             raise ValueError(
-                f"policy {str(file)!r}: model and card do not belong together: the model has "
+                f"policy {str(self._file)!r}: model and card do not belong together: the model has "
                 f"{'; '.join(faults)}; correct the card, or train it again"
             )
 
-    def _subtract(self, margin: float) -> None:
-        """Reduce the log odds of braking by a margin."""
-        demands, layer = self.card.demands, getattr(self.network, "action_net", None)
-        if demands is None or len(demands) != 2 or layer is None:
+    def _braking_action(self, has_odds: bool) -> int:
+        """Return the action whose log odds a margin reduces; `has_odds`: whether actions have them."""
+        demands = self.card.demands
+        if demands is None or len(demands) != 2 or not has_odds:
             raise ValueError(
-                f"{self.name} must have two demands and action probabilities for margin={margin:g}; "
+                f"{self.name} must have two demands and action probabilities for margin={self._margin:g}; "
                 "omit margin"
             )
-        layer.bias.data[int(np.argmin(demands))] -= margin
+        return int(np.argmin(demands))
 
     @property
     def camera(self) -> "ChannelSpec":
@@ -313,8 +344,8 @@ class Policy(StagedAgent):
 
     def _allocate(self, num_envs: int) -> None:
         super()._allocate(num_envs)
-        features, names = self.card.features, tuple(self.network.observation_space.spaces)
-        inputs = RawInputs(names) if features is None else FeatureHistory(features, num_envs)
+        features = self.card.features
+        inputs = RawInputs(self._names) if features is None else FeatureHistory(features, num_envs)
         self._inputs: PolicyInputs = inputs
         if self._normalizer is not None:
             self._inputs = NormalizedInputs(inputs, self._normalizer)
@@ -395,14 +426,50 @@ def load_network(path: Path, card: PolicyCard) -> Any:
     except ImportError:
         raise missing_extra("a policy", "train") from None
     torch.set_num_threads(1)  # small network; episodes run in parallel processes; see `Policy`
-    try:
+    with _explained(path, card):
         if card.network is not None:
-            return _described_network(path, card)
+            return copy.deepcopy(_remembered(_described_network, path, card))  # a margin changes it
         announce_pickle(path)
         network = getattr(stable_baselines3, card.algo.upper()).load(path, device="cpu").policy
         network.set_training_mode(False)
         return network
-    except Exception as error:  # of the archive, pickle, PyTorch or stable-baselines3
+
+
+def _torch_values(network: Any, names: tuple[str, ...]) -> ActionValues:
+    """Return the function that calculates the values of the actions of a `BasePolicy`."""
+    layers = dense_layers(network)
+    if layers is None:
+        return partial(action_values, network)
+    steps = dense_steps(layers)
+    return partial(layer_values, layers, names) if steps is None else DenseNetwork(steps, names)
+
+
+def _described_steps(path: Path, card: PolicyCard) -> list[Step] | None:
+    """Return the steps of a `DenseNetwork` that a card describes; None if only PyTorch can load it.
+
+    Raises:
+        ValueError: If the file is damaged or does not fit its card.
+    """
+    with _explained(path, card):
+        return None if card.network is None else _remembered(_load_steps, path, card)
+
+
+def _load_steps(path: Path, card: PolicyCard) -> list[Step] | None:
+    assert card.network is not None
+    return load_steps(card.network, path, card.algo, card.num_actions)
+
+
+def _described_network(path: Path, card: PolicyCard) -> Any:
+    assert card.network is not None
+    return card.network.load(path, card.algo, card.num_actions)
+
+
+@contextmanager
+def _explained(path: Path, card: PolicyCard) -> Generator[None, None, None]:
+    """Raise ValueError of one line for any error of the archive, pickle, PyTorch or stable-baselines3."""
+    try:
+        yield
+    except Exception as error:
         reason = (str(error) or type(error).__name__).splitlines()[0]
         raise ValueError(
             f"policy {shown(str(path))} cannot be loaded with algo {shown(card.algo)} ({reason}); "
@@ -410,21 +477,21 @@ def load_network(path: Path, card: PolicyCard) -> Any:
         ) from None
 
 
-_LOADED: dict[tuple[object, ...], Any] = {}  # the last networks
-_MAX_LOADED = 4
+_LOADED: dict[tuple[object, ...], Any] = {}  # the last results
+_MAX_LOADED = 8
 
 
-def _described_network(path: Path, card: PolicyCard) -> Any:
-    """Return the network that a card describes; a copy, because a margin changes it.
+def _remembered(load: Callable[[Path, PolicyCard], Any], path: Path, card: PolicyCard) -> Any:
+    """Return `load(path, card)`, which the caller must not change.
 
-    The last networks are remembered: loading takes half a second, and a benchmark makes an agent per episode.
+    The last results are remembered: a benchmark makes an agent per episode, and PyTorch loads for half a
+    second.
     """
-    assert card.network is not None
     state = path.stat()
-    key = (path.resolve(), state.st_mtime_ns, state.st_size, repr(card))
+    key = (load, path.resolve(), state.st_mtime_ns, state.st_size, repr(card))
     if key not in _LOADED:
-        network = card.network.load(path, card.algo, card.num_actions)
+        found = load(path, card)
         if len(_LOADED) >= _MAX_LOADED:
             _LOADED.clear()
-        _LOADED[key] = network
-    return copy.deepcopy(_LOADED[key])
+        _LOADED[key] = found
+    return _LOADED[key]

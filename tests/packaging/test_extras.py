@@ -2,9 +2,11 @@
 
 import json
 import sys
+import zipfile
 
 import pytest
 
+from lgmd_gym.agents.policies.card import CARD
 from lgmd_gym.cli import main as cli
 from lgmd_gym.processes import extras
 
@@ -48,7 +50,7 @@ def test_other_installations(clone, tmp_path, monkeypatch):
 @pytest.mark.parametrize(("arguments", "module", "extra"), [
     (["train"], "tensorboard", "train"),
     (["tune"], "optuna", "train"),
-    (["bench", "--agents", "policy:all-round"], "stable_baselines3", "train"),
+    (["bench", "--agents", "policy:pickled.zip"], "stable_baselines3", "train"),
     (["drive", "LGMD/CCRs-v0", "--agent", "flow-divergence"], "cv2", "flow"),
     (["bench", "--backend", "dask", "--address", "tcp://x:1"], "distributed", "cluster"),
 ])  # fmt: skip
@@ -57,6 +59,8 @@ def test_commands_state_how_to_install_what_is_missing(
 ):
     install(monkeypatch, {"url": clone.as_uri(), "dir_info": {"editable": True}})
     monkeypatch.chdir(tmp_path)
+    with zipfile.ZipFile("pickled.zip", "w") as policy:
+        policy.writestr(CARD, '{"algo": "ppo", "camera": "fovea"}')
     for name in [name for name in sys.modules if name.partition(".")[0] == module]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, module, None)
