@@ -10,7 +10,7 @@ from rich.console import Console
 
 from lgmd_gym.aliases import Arguments, Values
 from lgmd_gym.cli.console import activity, make_console
-from lgmd_gym.cli.overview import OVERVIEW, SEEDS, default_agents, print_overview
+from lgmd_gym.cli.overview import IDEAS, OVERVIEW, SEEDS, print_overview
 from lgmd_gym.cli.values import (
     Count,
     File,
@@ -212,7 +212,7 @@ def _new(options: Bench, executor: "Executor") -> "list[Run]":
     values = {name: value for name, value in given.items() if value is not None}
     if options.config is None:
         if {"suite", "agents"}.isdisjoint(values):
-            overview: Arguments = {"agents": default_agents(), "seeds": SEEDS}
+            overview: Arguments = {"agents": tuple(IDEAS), "seeds": SEEDS}
             values = overview | values
         modules = chosen_modules(values.get("suite", ()), values.pop("module", ()), options.trust)
         suites = _suites(values.pop("suite", (OVERVIEW,)))

@@ -84,7 +84,7 @@ def agents() -> Table:
     for name in shipped_policies():
         card = read_card(find_policy(name))
         inputs = ", ".join(card["features"]["inputs"])
-        description = f'Learned policy with the inputs {inputs}; requires the extra "train".'
+        description = f"Learned policy with the inputs {inputs}."
         options = "margin=0" if card.get("brake") or len(card["demands"] or ()) == 2 else ""
         table.add_row(f"policy:{name}", _entry(description, "options", options))
     return table

@@ -1,7 +1,6 @@
 """The default of `bench`: what the package is about, on one screen."""
 
 import shlex
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -19,26 +18,17 @@ IDEAS = {
     "last-moment-oracle": "the bound: knows the future, and brakes at the last moment that avoids a contact.",
 }
 """Agents of the default run, with one sentence on each."""
-POLICY = "policy:all-round"
-
-
-def default_agents() -> tuple[str, ...]:
-    """Return the agents of the default run; the policy only if its extra is installed."""
-    return tuple(name for name in IDEAS if name != POLICY or find_spec("torch") is not None)
 
 
 def print_overview(rows: "list[Row]", agents: list[str], console: Console, neuron: str | None = None) -> None:
     """Print the scores in the laboratory and in worlds, one sentence on each agent, and what to run next."""
     from lgmd_gym.benchmark.analysis.tables import place_table
     from lgmd_gym.benchmark.task import NO_BRAKE
-    from lgmd_gym.processes.extras import missing_extra
     from lgmd_gym.report.conclusion import agent_note
 
     console.print(place_table(rows, agents))
     for agent in agents:
         console.print(f"{agent} – {IDEAS.get(agent) or agent_note(agent)}")
-    if POLICY not in agents and find_spec("torch") is None:
-        console.print(f"Left out: {missing_extra(POLICY, 'train')}")
     chosen = [agent for agent in agents if agent != NO_BRAKE]
     words = ["lgmd-gym bench --suite r152 --seeds 20 --conditions mixed"]
     if any(agent not in IDEAS for agent in chosen):

@@ -2,7 +2,6 @@
 
 import io
 
-import pytest
 from rich.console import Console
 from support.rows import threat_row
 
@@ -38,12 +37,8 @@ def test_the_table_has_the_laboratory_and_worlds():
     assert table.caption.startswith("3 cases in the laboratory and 1 world; k/n episodes; avoided: ")
 
 
-@pytest.mark.parametrize("installed", [True, False])
-def test_the_policy_is_an_agent_if_it_can_be_loaded(monkeypatch, installed):
-    monkeypatch.setattr(overview, "find_spec", lambda name: object() if installed else None)
-    agents = overview.default_agents()
-    assert (overview.POLICY in agents) is installed
-    assert [name for name in agents if name in AGENTS] == [
+def test_each_agent_of_the_default_run_has_a_sentence():
+    assert [name for name in overview.IDEAS if name in AGENTS] == [
         *("no-brake", "spike-threshold", "stopping-zone", "last-moment-oracle")
     ]
     out = io.StringIO()
@@ -54,7 +49,6 @@ def test_the_policy_is_an_agent_if_it_can_be_loaded(monkeypatch, installed):
     assert printed.endswith(
         "next: lgmd-gym bench --suite r152 --seeds 20 --conditions mixed --agents ttc-oracle\n"
     )
-    assert ('Left out: policy:all-round requires the extra "train"' in printed) is not installed
 
 
 def test_the_next_command_has_the_neuron_of_the_run():
