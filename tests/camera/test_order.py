@@ -5,12 +5,12 @@ import pytest
 from support.records import lens_of
 from support.roads import box_record
 
-from lgmd_gym.camera.objects import MODEL_MARK, MODEL_TREE
+from lgmd_gym.camera.objects import MODEL_BEAM, MODEL_BOX, MODEL_MARK, MODEL_POST, MODEL_RAIL, MODEL_TREE
 from lgmd_gym.camera.render.seen import Seen, aim_frustum, make_seen, order_objects, seen_by
 
 
-def drawing_order(*records, **lens):
-    """Return the indices of the visible objects in drawing order."""
+def ordered(*records, **lens):
+    """Return the indices of the visible objects in drawing order, and whether this order is a right one."""
     arrays = (array.view(np.recarray) if array.dtype.names else array for array in make_seen(1))
     seen, posed, count = Seen(*arrays), lens_of(**lens), len(records)
     aim_frustum(posed, seen.frusta[0])
@@ -18,8 +18,13 @@ def drawing_order(*records, **lens):
         seen.objects[i] = record[0]
         seen.lenses[i] = seen_by(seen.frusta, 1, seen.objects[i], False)
     seen.counts[0] = count
-    order_objects(posed, posed.focal, 1, seen)
-    return seen.order[: seen.counts[1]].tolist()
+    exists = order_objects(posed, posed.focal, 1, seen)
+    return seen.order[: seen.counts[1]].tolist(), bool(exists)
+
+
+def drawing_order(*records, **lens):
+    """Return the indices of the visible objects in drawing order."""
+    return ordered(*records, **lens)[0]
 
 
 def test_car_is_in_front_of_the_wall_whose_centre_is_nearer():
@@ -54,10 +59,68 @@ def test_marks_come_last():
     assert drawing_order(mark, car) == [1, 0]
 
 
-def test_boxes_that_hide_each_other_in_turn_are_all_drawn():
-    """Three long boxes, each with an end in front of the next one; none may be drawn first."""
-    boxes = [
-        box_record(20.0 + 4.0 * np.cos(turn), 4.0 * np.sin(turn), (16.0, 0.5, 3.0), heading=turn + 1.9)
-        for turn in (0.0, 2.1, 4.2)
-    ]
-    assert sorted(drawing_order(*boxes)) == [0, 1, 2]
+def test_objects_that_intersect_are_all_drawn():
+    """A post in a container behind a rail: nearer than the rail, which hides the container around it."""
+    rail = box_record(-41.92, -108.98, (5.32, 0.12, 0.75), heading=0.08, model=MODEL_RAIL)
+    post = box_record(-44.58, -108.73, (0.1, 0.1, 1.0), model=MODEL_POST)
+    container = box_record(-44.5, -108.58, (7.22, 0.8, 5.31))
+    order, exists = ordered(rail, post, container, yaw=-1.94)
+    assert sorted(order) == [0, 1, 2]
+    assert not exists
+
+
+def test_objects_whose_azimuths_only_touch_hide_each_other_in_neither_order():
+    """A post behind a rail, beside it in the frame: planes between them have the lens on either side."""
+    rail = box_record(129.9, -6.75, (8.0, 0.12, 0.75), model=MODEL_RAIL)
+    post = box_record(128.9, -7.2, (0.1, 0.1, 1.0), model=MODEL_POST)
+    assert ordered(rail, post)[1]
+    assert ordered(post, rail)[1]
+
+
+@pytest.mark.parametrize("turn", [0, 1, 2])
+def test_arm_of_a_lamp_behind_a_hedge_has_a_drawing_order(turn):
+    """The arm is above the hedge, and in front of its side; the pole ends above the arm."""
+    pole = box_record(147.0, -7.5, (0.16, 0.16, 7.9), model=MODEL_BOX)
+    arm = box_record(147.0, -6.5, (0.2, 1.9, 7.9), model=MODEL_BEAM, base=7.76)
+    hedge = box_record(138.5, -9.1, (24.0, 2.8, 5.6), model=MODEL_BOX)
+    records = [pole, arm, hedge]
+    order, exists = ordered(*records[turn:], *records[:turn])
+    names = [("pole", "arm", "hedge")[(turn + index) % 3] for index in order]
+    assert exists
+    assert names.index("hedge") < names.index("pole") < names.index("arm")
+
+
+def first_and_further_hits(boxes, azimuth):
+    """Return the box that a ray from the origin meets first, and the others that it meets, by index."""
+    entries = []
+    for index, (x, y, heading, length, width) in enumerate(boxes):
+        c, s = np.cos(heading), np.sin(heading)
+        start = np.array([-x * c - y * s, x * s - y * c])  # of the ray, along the sides of the box
+        step = np.array([np.cos(azimuth - heading), np.sin(azimuth - heading)])
+        half = 0.5 * np.array([length, width])
+        enter, leave = np.sort([(-half - start) / step, (half - start) / step], axis=0)
+        if enter.max() < leave.min() and leave.min() > 0.0:
+            entries.append((enter.max(), index))
+    hits = [index for _, index in sorted(entries)]
+    return hits[:1], hits[1:]
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_what_a_ray_meets_first_is_drawn_last(seed):
+    """Boxes in strips across the view; in odd seeds upright and wide, in even ones of any heading."""
+    rng = np.random.default_rng(seed)
+    strips = 6.0 + np.cumsum(rng.uniform(1.0, 9.0, 14))
+    boxes = []
+    for middle, depth in zip(0.5 * (strips[1:] + strips[:-1]), np.diff(strips), strict=True):
+        size = (0.8 * depth, rng.uniform(0.1, 20.0)) if seed % 2 else rng.uniform(0.1, 0.7, 2) * depth
+        boxes.append((middle, rng.uniform(-0.5, 0.5) * middle, (1 - seed % 2) * rng.uniform(0.0, 3.1), *size))
+    rng.shuffle(boxes)
+    yaw, met = rng.uniform(-0.3, 0.3), 0
+    records = [box_record(x, y, (length, width, 3.0), heading=turn) for x, y, turn, length, width in boxes]
+    order, exists = ordered(*records, yaw=yaw)
+    assert exists
+    for azimuth in yaw + np.linspace(-0.5, 0.5, 200):
+        first, further = first_and_further_hits(boxes, azimuth)
+        met += len(further)
+        assert all(order.index(other) < order.index(first[0]) for other in further)
+    assert met > 0

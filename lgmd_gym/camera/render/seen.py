@@ -207,46 +207,47 @@ def _footprint(eye, obj, away):
 
 
 @kernel
-def _separating_side(a, b, px, py):
-    """Find a side of box a that separates it from box b.
+def _sides_of(a, b, px, py):
+    """Return whether planes along sides of box a separate it from box b.
 
-    Returns 1 if the point (px, py) is on a's side of it (a may hide b, but not the reverse), -1 if it is on
-    b's side, 0 if there is no such side.
+    Returns whether one of them has the point (px, py) on a's side, and whether one has it on b's side.
     """
     dx, dy = b.x - a.x, b.y - a.y
     bx, by = dx * a.cos + dy * a.sin, dy * a.cos - dx * a.sin
     cos, sin = abs(a.cos * b.cos + a.sin * b.sin), abs(b.sin * a.cos - b.cos * a.sin)
     half_x = 0.5 * (cos * b.length + sin * b.width)
     half_y = 0.5 * (sin * b.length + cos * b.width)
+    gap_x, gap_y = abs(bx) - half_x - 0.5 * a.length, abs(by) - half_y - 0.5 * a.width
     ex, ey = px - a.x, py - a.y
     lx, ly = ex * a.cos + ey * a.sin, ey * a.cos - ex * a.sin
-    side_x = abs(bx) - half_x - 0.5 * a.length
-    side_y = abs(by) - half_y - 0.5 * a.width
-    if side_x < 0.0 and side_y < 0.0:
-        return 0
-    if side_x >= side_y:
-        beyond = lx * (1.0 if bx > 0.0 else -1.0) > 0.5 * a.length + 0.5 * side_x
-    else:
-        beyond = ly * (1.0 if by > 0.0 else -1.0) > 0.5 * a.width + 0.5 * side_y
-    return -1 if beyond else 1
+    # Both planes are in the middle of their gaps.
+    beyond_x = (lx if bx > 0.0 else -lx) > 0.5 * a.length + 0.5 * gap_x
+    beyond_y = (ly if by > 0.0 else -ly) > 0.5 * a.width + 0.5 * gap_y
+    apart_x, apart_y = gap_x >= 0.0, gap_y >= 0.0
+    on_a = (apart_x and not beyond_x) or (apart_y and not beyond_y)
+    return on_a, (apart_x and beyond_x) or (apart_y and beyond_y)
 
 
 @kernel
 def _hides(a, b, eye, away_a, away_b):
-    """Return whether object a must be drawn after object b: a plane between them has the lens on a's side."""
-    if a.base > 0.0 and a.base >= b.height:
-        return eye.z > 0.5 * (a.base + b.height)
-    if b.base > 0.0 and b.base >= a.height:
-        return eye.z < 0.5 * (b.base + a.height)
+    """Return whether object a must be drawn after object b.
+
+    It must if a plane between them has the lens on a's side. If another one has it on b's side, neither hides
+    the other. Of objects without a plane between them, the nearer one is drawn later.
+    """
     if is_picture(a.model) and is_picture(b.model):
         return away_a < away_b
     box_a, box_b = _footprint(eye, a, away_a), _footprint(eye, b, away_b)
-    side = _separating_side(box_a, box_b, eye.x, eye.y)
-    if side == 0:
-        side = -_separating_side(box_b, box_a, eye.x, eye.y)
-    if side == 0:
-        return away_a < away_b
-    return side > 0
+    on_a, on_b = _sides_of(box_a, box_b, eye.x, eye.y)
+    also_b, also_a = _sides_of(box_b, box_a, eye.x, eye.y)
+    on_a, on_b = on_a or also_a, on_b or also_b
+    if a.base > 0.0 and a.base >= b.height:
+        above = eye.z > 0.5 * (a.base + b.height)
+        on_a, on_b = on_a or above, on_b or not above
+    elif b.base > 0.0 and b.base >= a.height:
+        below = eye.z < 0.5 * (b.base + a.height)
+        on_a, on_b = on_a or below, on_b or not below
+    return away_a < away_b if not (on_a or on_b) else on_a and not on_b
 
 
 @kernel
@@ -300,6 +301,8 @@ def _farther(eye, objects, order, first, n, at, distances, extents):
     i = order[at]
     for k in range(first, n):
         j = order[k]
+        if extents[j, 3] < extents[i, 2]:
+            break  # this object and the next ones, which reach less far, are nearer
         if (
             k != at
             and _meets_view(extents[i], extents[j])
@@ -310,25 +313,35 @@ def _farther(eye, objects, order, first, n, at, distances, extents):
 
 
 @kernel
-def _correct_order(eye, focal, objects, order, n, distances, extents):
+def _farthest(eye, objects, order, first, n, distances, extents):
+    """Return the place, from `first` on, of an object that hides no other one, and whether there is one.
+
+    Otherwise it is one of some objects that hide each other in turn, found by Brent's algorithm.
+    """
+    at, passed, steps, limit = first, order[first], 0, 1
+    while True:
+        behind = _farther(eye, objects, order, first, n, at, distances, extents)
+        if behind < 0:
+            return at, True
+        at = behind
+        if order[at] == passed:
+            return at, False
+        steps += 1
+        if steps == limit:
+            passed, steps, limit = order[at], 0, 2 * limit
+
+
+@kernel
+def _correct_order(eye, objects, order, n, distances, extents):
     """Move objects that are drawn too early behind those they hide; the others stay in order.
 
     Returns whether every object is drawn before those that hide it. Only objects with common azimuths hide
     each other, so that this order exists unless some objects hide each other in turn.
     """
-    for i in range(n):
-        j = order[i]
-        _write_extent(eye, focal, objects[j], distances[j], extents[j])
     exists = True
     for first in range(n - 1):
-        at = first
-        for _ in range(n):
-            behind = _farther(eye, objects, order, first, n, at, distances, extents)
-            if behind < 0:
-                break
-            at = behind
-        else:
-            exists = False
+        at, found = _farthest(eye, objects, order, first, n, distances, extents)
+        exists &= found
         moved = order[at]
         for k in range(at, first, -1):
             order[k] = order[k - 1]
@@ -349,24 +362,21 @@ def order_objects(eye, focal, lenses, seen):
     Returns:
         Whether every object comes before those that hide it; objects may hide each other in turn.
     """
-    objects, order, distances, count, n = seen.objects, seen.order, seen.distances, seen.counts[0], 0
+    objects, order, distances, extents, n = seen.objects, seen.order, seen.distances, seen.extents, 0
     # From the end: the roadside comes last, sorted by x, so that driving along x meets the far ones first.
-    for i in range(count - 1, -1, -1):
+    for i in range(seen.counts[0] - 1, -1, -1):
         if objects[i].model == MODEL_MARK or seen.lenses[i] & lenses == 0:
             continue
         distances[i] = distance(eye, objects[i])
-        k = n
-        while k > 0:
-            j = order[k - 1]
-            if not _hides(objects[j], objects[i], eye, distances[j], distances[i]):
-                break
-            order[k] = j
+        _write_extent(eye, focal, objects[i], distances[i], extents[i])
+        k, reach = n, extents[i, 3]
+        while k > 0 and extents[order[k - 1], 3] < reach:
+            order[k] = order[k - 1]
             k -= 1
         order[k] = i
         n += 1
-    # The insertion compares neighbours only, and objects side by side are not in a transitive order.
-    exists = _correct_order(eye, focal, objects, order, n, distances, seen.extents)
-    for i in range(count - 1, -1, -1):
+    exists = _correct_order(eye, objects, order, n, distances, extents)
+    for i in range(seen.counts[0] - 1, -1, -1):
         if objects[i].model == MODEL_MARK and seen.lenses[i] & lenses != 0:
             order[n] = i
             n += 1
