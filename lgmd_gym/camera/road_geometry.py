@@ -23,8 +23,11 @@ SHOULDER = 0.5
 """Width of the asphalt beyond the outer line [m]."""
 STRIPED, CONTINUOUS, CONTINUOUS_LINE = 1, 2, 3  # highway_env.road.lane.LineType
 
-LINE = np.dtype([(name, np.float64) for name in ("x0", "y0", "x1", "y1", "start", "striped")])
-"""A straight piece of a marking: its ends and its start along the lane [m], 1.0 if striped."""
+QUAD = np.dtype([("corners", np.float64, 8), *((name, np.float64) for name in ("x", "y", "radius"))])
+"""A quad of asphalt: x, y of its corners in turn; centre and radius of a circle around them [m]."""
+LINE = np.dtype([(name, np.float64) for name in ("x", "y", "cos", "sin", "length", "start", "striped")])
+"""A straight piece of a marking: its first end [m], direction, length and start along the lane [m], 1.0 if
+striped."""
 
 _LANE_STEP = 2.0
 _IN_LINE = 1e-6  # ends of lanes in line with each other [m]
@@ -36,7 +39,7 @@ _BAY_LENGTH = 20.0  # a network whose longest lane is no longer than this is a c
 class RoadGeometry(NamedTuple):
     """The static part of a road."""
 
-    surface: np.ndarray  # asphalt as quads, float64, shape (n, 8): x, y of the corners in turn [m]
+    surface: np.ndarray  # asphalt, `QUAD` records, shape (n,)
     lines: np.ndarray  # markings, `LINE` records, shape (n,)
     roadside: np.ndarray  # posts, trees and guard rails, `OBJECT` records sorted by x, shape (n,)
     paved: bool  # whether all ground is asphalt, as for a road without lanes
@@ -95,7 +98,7 @@ def _lanes(network: "RoadNetwork") -> "list[AbstractLane]":
 def _extract(lanes: "list[AbstractLane]", *key: Any) -> RoadGeometry:
     """Return the geometry of lanes; `key` is the other arguments of `road_geometry`."""
     if not lanes:
-        return RoadGeometry(np.zeros((0, 8)), np.zeros(0, LINE), np.zeros(0, OBJECT), True)
+        return RoadGeometry(np.zeros(0, QUAD), np.zeros(0, LINE), np.zeros(0, OBJECT), True)
     surface: list[np.ndarray] = []
     lines: list[np.ndarray] = [np.zeros((0, 6))]
     segments: list[np.ndarray] = []
@@ -111,8 +114,8 @@ def _extract(lanes: "list[AbstractLane]", *key: Any) -> RoadGeometry:
         records = np.zeros(0, OBJECT)
     else:
         records = _roadside_of(np.concatenate(segments).tobytes(), *key)
-    lines_once = _without_duplicates(np.concatenate(lines))
-    return RoadGeometry(_joined(np.concatenate(surface)), lines_once.view(LINE)[:, 0], records, False)
+    quads = _with_circles(_joined(np.concatenate(surface)))
+    return RoadGeometry(quads, line_records(_without_duplicates(np.concatenate(lines))), records, False)
 
 
 @lru_cache(maxsize=16)
@@ -173,6 +176,27 @@ def _joined(surface: np.ndarray) -> np.ndarray:
         else:
             joined.append(quad)
     return np.array(joined)
+
+
+def _with_circles(quads: np.ndarray) -> np.ndarray:
+    """Return the `QUAD` records of quads, shape (n, 8): x, y of their corners in turn."""
+    corners = quads.reshape(-1, 4, 2)
+    centres = corners.mean(axis=1)
+    radii = np.linalg.norm(corners - centres[:, None], axis=2).max(axis=1)
+    return np.column_stack((quads, centres, radii)).view(QUAD)[:, 0]
+
+
+def line_records(lines: np.ndarray) -> np.ndarray:
+    """Return the `LINE` records of lines with a length.
+
+    Args:
+        lines: x, y of both ends and the start along the lane [m], 1.0 if striped; float64, shape (n, 6).
+    """
+    sides = lines[:, 2:4] - lines[:, :2]
+    lengths = np.hypot(*sides.T)
+    lines, sides, lengths = (values[lengths > 0.0] for values in (lines, sides, lengths))
+    records = np.column_stack((lines[:, :2], sides / lengths[:, None], lengths, lines[:, 4:]))
+    return records.view(LINE)[:, 0]
 
 
 def _continues(quad: np.ndarray, other: np.ndarray) -> bool:

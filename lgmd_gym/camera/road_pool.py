@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 
 from lgmd_gym.camera.objects import OBJECT
-from lgmd_gym.camera.road_geometry import LINE, RoadGeometry, network_of, road_geometry
+from lgmd_gym.camera.road_geometry import LINE, QUAD, RoadGeometry, network_of, road_geometry
 from lgmd_gym.camera.scene import Scene
 from lgmd_gym.camera.worlds import draw_world
 from lgmd_gym.kernels.bundle import Bundle
@@ -39,7 +39,7 @@ def scene_geometry(road: "Road | RoadNetwork", scene: Scene) -> RoadGeometry:
 class RoadArrays(NamedTuple):
     """Roads as the kernels read them."""
 
-    surface: np.ndarray  # asphalt of all roads, float64, shape (n, 8); see `RoadGeometry`
+    surface: np.ndarray  # asphalt of all roads, `QUAD` records
     lines: np.ndarray  # markings of all roads, `LINE` records
     roadside: np.ndarray  # posts, trees and rails of all roads, `OBJECT` records
     # first and last + 1 row of `surface`, `lines` and `roadside`, and 1 for an all-paved ground, per
@@ -63,7 +63,7 @@ class RoadPool:
 
     def __init__(self, num_envs: int) -> None:
         spans = np.zeros((num_envs, 7), dtype=np.int64)
-        self.arrays = RoadArrays(np.zeros((0, 8)), np.zeros(0, LINE), np.zeros(0, OBJECT), spans)
+        self.arrays = RoadArrays(np.zeros(0, QUAD), np.zeros(0, LINE), np.zeros(0, OBJECT), spans)
         self.bundle = Bundle(*self.arrays)
         self._roads: list[tuple[Road | RoadNetwork, RoadKey] | None] = [None] * num_envs
         self._stored: dict[bytes, Span] = {}

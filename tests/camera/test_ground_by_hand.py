@@ -6,13 +6,15 @@ import numba as nb
 import numpy as np
 import pytest
 from support.cameras import rig
-from support.records import frustum_of, lens_of, records
+from support.records import frustum_of, lens_of, record
+from support.roads import ring_road
 
 from lgmd_gym.camera.effects import look_of
 from lgmd_gym.camera.render.buffers import GroundLayer
-from lgmd_gym.camera.render.ground import PAINT, add_lines
+from lgmd_gym.camera.render.ground import PAINT, ROAD, add_lines, add_road
+from lgmd_gym.camera.render.seen import FRUSTUM
 from lgmd_gym.camera.render.texture import TEXEL_M, bend_of, bent_texels, distance_ahead, texture_line
-from lgmd_gym.camera.road_geometry import LINE
+from lgmd_gym.camera.road_geometry import STRIPED, line_records, road_geometry
 from lgmd_gym.kernels import kernel
 from lgmd_gym.kernels.simd import as_floats, lane_numbers, splat, store
 
@@ -127,9 +129,7 @@ def painted(*lines, yaw=0.0, x=0.0, y=0.0, shape=(160, 120)):
     pose = {"yaw": yaw, "pitch": -pi / 2 + 1e-9, "z": 10.0, "x": x, "y": y, "shape": shape}
     lens = lens_of(**pose)
     layer = GroundLayer(coverage, np.zeros((3, 16)), np.zeros((2, 20)), np.zeros((2, 8)), frustum_of(**pose))
-    names = LINE.names
-    pieces = records(LINE, *(dict(zip(names, map(float, line), strict=True)) for line in lines))
-    add_lines(layer, lens, pieces, LOOK)
+    add_lines(layer, lens, line_records(np.array(lines)).view(np.recarray), LOOK)
     return np.cumsum(coverage[PAINT], axis=1)[:, :-2] / 100
 
 
@@ -189,11 +189,29 @@ def test_far_stripes_are_painted_as_their_mean():
     # Z²/(f·h) = 3·4.33 m at Z = 36 m; from 40 m on no stripe is separate.
     for striped, target in ((1.0, coverage), (0.0, solid)):
         layer = layer._replace(coverage=target)
-        add_lines(
-            layer,
-            lens,
-            records(LINE, dict(zip(LINE.names, (40.0, 0.0, 90.0, 0.0, 0.0, striped), strict=True))),
-            LOOK,
-        )
+        lines = line_records(np.array([(40.0, 0.0, 90.0, 0.0, 0.0, striped)]))
+        add_lines(layer, lens, lines.view(np.recarray), LOOK)
     ratio = np.cumsum(coverage[PAINT], axis=1).sum() / np.cumsum(solid[PAINT], axis=1).sum()
     assert ratio == pytest.approx(3 / 4.33, rel=1e-3)
+
+
+@compiled_only
+@pytest.mark.parametrize("roll", [0.0, 0.1])
+@pytest.mark.parametrize("pitch", [-0.3, 0.0, 0.2])
+@pytest.mark.parametrize("turn", [0.3, 2.0, 4.4])
+def test_what_is_outside_the_view_is_left_out(turn, pitch, roll):
+    """A ring has asphalt and stripes left of, right of, above and below a view: they add nothing to it."""
+    road, lane = ring_road(kind=STRIPED)
+    geometry, (x, y) = road_geometry(road), lane.position(40.0 * turn, 0.5)
+    pose = {"x": x, "y": y, "yaw": lane.heading_at(40.0 * turn) + 0.2, "pitch": pitch, "roll": roll}
+    everywhere = record(FRUSTUM, tangent=-1.0, near=-np.inf, far=np.inf)
+    sums = []
+    for frustum in (everywhere, frustum_of(**pose)):
+        coverage = np.zeros((4, 80, 122), np.float32)
+        layer = GroundLayer(coverage, np.zeros((3, 16)), np.zeros((2, 20)), np.zeros((2, 8)), frustum)
+        add_road(layer, lens_of(**pose), geometry.surface.view(np.recarray))
+        add_lines(layer, lens_of(**pose), geometry.lines.view(np.recarray), LOOK)
+        sums.append(np.cumsum(coverage, axis=2)[:, :, :120])
+    assert sums[0][ROAD].max() > 0.99
+    assert sums[0][PAINT].max() > 0.5
+    np.testing.assert_allclose(sums[1], sums[0], atol=3e-4)

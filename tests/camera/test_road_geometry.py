@@ -51,7 +51,8 @@ def test_every_highway_env_road_renders_with_markings(env_id):
 
 def ends_of(lines):
     """Both ends of the markings, shape (n, 2, 2)."""
-    return np.stack([lines["x0"], lines["y0"], lines["x1"], lines["y1"]], axis=1).reshape(-1, 2, 2)
+    starts, directions = (np.stack([lines[a], lines[b]], axis=1) for a, b in (("x", "y"), ("cos", "sin")))
+    return np.stack([starts, starts + lines["length"][:, None] * directions], axis=1)
 
 
 @pytest.mark.parametrize("clockwise", [True, False])
@@ -115,7 +116,7 @@ def test_geometry_is_cached_for_the_lifetime_of_the_network(monkeypatch):
 
 def test_straight_lane_is_one_piece_and_duplicate_lines_are_dropped():
     geometry = road_geometry(straight_env(lanes=4).road)
-    assert geometry.surface.shape == (1, 8)  # joined
+    assert geometry.surface.shape == (1,)  # joined
     assert geometry.lines.shape[0] == 5
     assert geometry.lines["striped"].sum() == 3
     net = RoadNetwork()
@@ -132,9 +133,10 @@ def test_lanes_side_by_side_are_joined_but_not_those_of_other_lengths_or_apart()
     for y, end in ((0.0, 100.0), (4.0, 100.0), (8.0, 90.0), (20.0, 90.0)):
         net.add_lane("a", "b", StraightLane([0, y], [end, y], width=4.0))
     surface = road_geometry(Road(net)).surface
-    assert surface.shape == (3, 8)
-    assert surface[0] == pytest.approx([0.0, -2.5, 0.0, 6.5, 100.0, 6.5, 100.0, -2.5])
-    assert surface[1] == pytest.approx([0.0, 5.5, 0.0, 10.5, 90.0, 10.5, 90.0, 5.5])
+    assert surface.shape == (3,)
+    assert surface["corners"][0] == pytest.approx([0.0, -2.5, 0.0, 6.5, 100.0, 6.5, 100.0, -2.5])
+    assert surface["corners"][1] == pytest.approx([0.0, 5.5, 0.0, 10.5, 90.0, 10.5, 90.0, 5.5])
+    assert surface[1].tolist()[1:] == pytest.approx((45.0, 8.0, np.hypot(45.0, 2.5)))
 
 
 def test_network_without_lanes_is_all_asphalt():

@@ -29,7 +29,7 @@ _SEEN = (
     "_ground_light",
     "_surface_of",
     "_without_traces",
-    "add_ground_quad",
+    "add_road",
     "add_level_polygon",
     "add_ground_polygon",
     "add_outline",

@@ -24,8 +24,8 @@ def ground_light(scene, rays, row, column):
     y = lens.y + rays.forward * lens.sin_yaw + rays.across * lens.cos_yaw
     # Lanes overlap: the coverage of a pixel is the sum of theirs.
     road = np.full(x.shape, float(scene.road.paved))
-    for quad in scene.road.surface:
-        road += rays.shown & inside(x, y, quad.reshape(-1, 2))
+    for corners in scene.road.surface["corners"]:
+        road += rays.shown & inside(x, y, corners.reshape(-1, 2))
     paint, shadow = _marks_and_shadows(scene, x, y)
     paint += _markings(scene.road.lines, look, x, y)
     share = np.maximum(rays.mean(rays.fall > 0.0), 1e-9)
@@ -47,13 +47,10 @@ def _markings(lines, look, x, y):
     """Return the paint of the markings at points: the number of strokes that cover each one."""
     paint = np.zeros(x.shape)
     for piece in lines:
-        dx, dy = piece["x1"] - piece["x0"], piece["y1"] - piece["y0"]
-        length = math.hypot(dx, dy)
-        if length == 0.0:
-            continue
-        rx, ry = x - piece["x0"], y - piece["y0"]
-        along, beside = (rx * dx + ry * dy) / length, (ry * dx - rx * dy) / length
-        covered = (along >= 0.0) & (along <= length) & (np.abs(beside) <= 0.5 * look.line_width)
+        rx, ry = x - piece["x"], y - piece["y"]
+        along = rx * piece["cos"] + ry * piece["sin"]
+        beside = ry * piece["cos"] - rx * piece["sin"]
+        covered = (along >= 0.0) & (along <= piece["length"]) & (np.abs(beside) <= 0.5 * look.line_width)
         if piece["striped"]:
             covered &= (piece["start"] + along) % look.dash_period < look.dash
         paint += covered

@@ -19,6 +19,7 @@ import numpy as np
 
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, project_eight, sum_differences, winding
 from lgmd_gym.camera.render.light import row_air, through_air
+from lgmd_gym.camera.render.seen import beside, outside_band
 from lgmd_gym.camera.render.texture import (
     bend_of,
     bent_texels,
@@ -102,11 +103,24 @@ def add_outline(layer, k, lens, n, weight):
 
 
 @kernel
-def add_ground_quad(layer, k, lens, quad, weight):
-    """Add a quad of the ground, given as x, y of its four corners, to channel k."""
-    for i in range(4):
-        layer.outline[0, i], layer.outline[1, i] = quad[2 * i] - lens.x, quad[2 * i + 1] - lens.y
-    add_outline(layer, k, lens, 4, weight)
+def _is_outside(frustum, ahead, across, radius):
+    """Return whether a circle on the ground is outside the view; arguments as of `seen.beside`."""
+    return outside_band(frustum, ahead, radius) or beside(frustum, ahead, across, radius)
+
+
+@kernel
+def add_road(layer, lens, surface):
+    """Add the asphalt, `RoadGeometry.surface`, to the ground layer."""
+    for i in range(surface.shape[0]):
+        quad = surface[i]
+        dx, dy = quad.x - lens.x, quad.y - lens.y
+        ahead, across = dx * lens.cos_yaw + dy * lens.sin_yaw, dy * lens.cos_yaw - dx * lens.sin_yaw
+        if _is_outside(layer.frustum, ahead, across, quad.radius):
+            continue
+        for k in range(4):
+            layer.outline[0, k] = quad.corners[2 * k] - lens.x
+            layer.outline[1, k] = quad.corners[2 * k + 1] - lens.y
+        add_outline(layer, ROAD, lens, 4, 1.0)
 
 
 @kernel
@@ -327,20 +341,18 @@ def add_lines(layer, lens, lines, look):
     c, s = lens.cos_yaw, lens.sin_yaw
     for i in range(lines.shape[0]):
         piece = lines[i]
-        x0, y0 = piece.x0 - lens.x, piece.y0 - lens.y
-        dx, dy = piece.x1 - piece.x0, piece.y1 - piece.y0
-        length = math.sqrt(dx * dx + dy * dy)
-        if not length > 0.0:
-            continue
-        dx, dy = dx / length, dy / length
+        x0, y0, half = piece.x - lens.x, piece.y - lens.y, 0.5 * piece.length
         line = ViewedLine(
             ahead=x0 * c + y0 * s,
             across=y0 * c - x0 * s,
-            d_ahead=dx * c + dy * s,
-            d_across=dy * c - dx * s,
+            d_ahead=piece.cos * c + piece.sin * s,
+            d_across=piece.sin * c - piece.cos * s,
             width=look.line_width,
         )
-        a, b = _visible_part(layer.frustum, line, length)
+        ahead, across = line.ahead + half * line.d_ahead, line.across + half * line.d_across
+        if _is_outside(layer.frustum, ahead, across, half + line.width):
+            continue
+        a, b = _visible_part(layer.frustum, line, piece.length)
         if not b > a:
             continue
         if piece.striped == 0.0:

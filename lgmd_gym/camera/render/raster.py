@@ -28,7 +28,7 @@ from lgmd_gym.camera.render.buffers import (
     make_buffers,
 )
 from lgmd_gym.camera.render.figures import draw_figure
-from lgmd_gym.camera.render.ground import ROAD, add_ground_quad, add_lines, shade_row
+from lgmd_gym.camera.render.ground import ROAD, add_lines, add_road, shade_row
 from lgmd_gym.camera.render.light import BUDGET_PX, add_glare, add_sky_veil, add_sun_glare, aim_beam, light_at
 from lgmd_gym.camera.render.models import Models, all_models, most_polygons
 from lgmd_gym.camera.render.seen import MAX_EYE, Seen, aim_frustum, distance, make_seen, order_objects, see
@@ -78,8 +78,7 @@ def draw_distance(image, view, tables, horizon, buffers):
 def add_flats(layer, view, road, seen, n, member, clock):
     """Add roads, markings, shadows and marks to the ground layer."""
     lens, look = view.lens, view.look
-    for i in range(road.surface.shape[0]):
-        add_ground_quad(layer, ROAD, lens, road.surface[i], 1.0)
+    add_road(layer, lens, road.surface)
     add_lines(layer, lens, road.lines, look)
     mark(clock, LINES)
     for i in range(n):
