@@ -42,8 +42,10 @@ def test_tree_is_behind_the_wall_that_ends_farther_away():
 
 
 @pytest.mark.parametrize(("height", "order"), [(1.0, [1, 0]), (8.0, [0, 1])])
-def test_deck_hides_what_is_below_it_only_from_above(height, order):
-    car, deck = box_record(30.0, 0.0, (4.0, 1.8, 1.5)), box_record(28.0, 0.0, (10.0, 30.0, 7.0), base=5.0)
+@pytest.mark.parametrize(("x", "width"), [(30.0, 30.0), (32.0, 4.0)])
+def test_deck_hides_what_is_below_it_only_from_above(x, width, height, order):
+    """The car is below the middle of a wide deck, or below the far end of a narrow one."""
+    car, deck = box_record(x, 0.0, (4.0, 1.8, 1.5)), box_record(28.0, 0.0, (10.0, width, 7.0), base=5.0)
     assert drawing_order(car, deck, z=height) == order
 
 

@@ -139,6 +139,13 @@ def test_lanes_side_by_side_are_joined_but_not_those_of_other_lengths_or_apart()
     assert surface[1].tolist()[1:] == pytest.approx((45.0, 8.0, np.hypot(45.0, 2.5)))
 
 
+def test_road_is_drawn_along_all_of_its_length():
+    """Its quad is 5.2 km long; the middle of the circle around it is far from both of these places."""
+    camera = ego_camera("wide", texture=0.0, roadside=0.0)
+    first, last = (camera.render(straight_env(x=x, line_types=False)) for x in (0.0, 4600.0))
+    np.testing.assert_array_equal(first[48:], last[48:])  # above, the end of the road is visible
+
+
 def test_network_without_lanes_is_all_asphalt():
     env = straight_env()
     env.road.network = RoadNetwork()
