@@ -8,7 +8,9 @@ have none of the three until Python calls them.
 """
 
 import gc
+import itertools
 import os
+import secrets
 from collections.abc import Callable, Generator
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -17,6 +19,7 @@ from typing import Any
 import numba
 from llvmlite.binding import Linkage
 from numba.core import config, sigutils, types
+from numba.core.bytecode import FunctionIdentity
 from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
@@ -29,6 +32,21 @@ from lgmd_gym.aliases import Arguments
 from lgmd_gym.kernels.cache_folder import use_temporary_folder
 from lgmd_gym.kernels.compilation import lock_of_user, report_compilation
 from lgmd_gym.kernels.sources import source_stamp
+
+
+def _number_functions() -> None:
+    """Start the numbers that numba gives functions at a random one, in each process.
+
+    They are a part of the names that the linker knows functions by, and start at 1 in numba. Modules that two
+    processes have cached would then use one name for two functions, such as the sum and the product of
+    vectors, and the linker would take one of them for both.
+    """
+    FunctionIdentity._unique_ids = itertools.count(secrets.randbits(60))
+
+
+_number_functions()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_number_functions)
 
 # Versions of numba with the internals that `Kernel` uses; with any other, `kernel` is `numba.njit`.
 _KNOWN = (0, 62) <= numba.version_info.short <= (0, 68)

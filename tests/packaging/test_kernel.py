@@ -2,6 +2,7 @@
 
 import gc
 import importlib
+import os
 import pickle
 import subprocess
 import sys
@@ -9,6 +10,7 @@ import sys
 import numba
 import pytest
 from llvmlite.binding import Linkage
+from numba.core.bytecode import FunctionIdentity
 
 SOURCE = """
 from lgmd_gym.kernels import kernel
@@ -149,3 +151,57 @@ def test_a_cache_of_an_earlier_version_with_renamed_modules_is_replaced(squares,
         cwd=tmp_path, capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert run.stdout.startswith("27 ")
+
+
+VECTORS = """
+import sys
+import numpy as np
+from lgmd_gym.kernels import kernel
+from lgmd_gym.kernels.simd import load, store
+
+@kernel(exact=True, arrays=True)
+def add(a, b, out):
+    store(out, 0, load(a, 0) + load(b, 0))
+
+@kernel(exact=True, arrays=True)
+def multiply(a, b, out):
+    store(out, 0, load(a, 0) * load(b, 0))
+
+@kernel(exact=True, arrays=True)
+def both(a, b, out, product):
+    add(a, b, out)
+    multiply(a, b, product)
+
+a, b, out, product = (np.full(16, value, np.float32) for value in (2, 3, 0, 0))
+if __name__ == "__main__":
+    import vectors
+    if sys.argv[1] == "both":
+        vectors.both(a, b, out, product)
+        print(out[0], product[0], len(vectors.add.stats.cache_hits), len(vectors.multiply.stats.cache_hits))
+    else:
+        getattr(vectors, sys.argv[1]).compile_inner(a, b, out)
+"""
+
+
+def test_functions_that_two_processes_compiled_are_linked_by_their_own_names(tmp_path):
+    """Each process compiles one operator of vectors first; both have the same Python names and types."""
+    (tmp_path / "vectors.py").write_text(VECTORS)
+    for name in ("add", "multiply", "both"):
+        run = subprocess.run(
+            [sys.executable, "vectors.py", name], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+    assert run.stdout == "5.0 6.0 1 1\n"
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no forks")
+def test_a_forked_process_numbers_functions_anew():
+    before = next(FunctionIdentity._unique_ids)
+    reading, writing = os.pipe()
+    if (child := os.fork()) == 0:
+        os.write(writing, str(next(FunctionIdentity._unique_ids)).encode())
+        os._exit(0)
+    os.waitpid(child, 0)
+    number = int(os.read(reading, 100))
+    os.close(reading)
+    os.close(writing)
+    assert abs(number - before) > 1_000_000
