@@ -84,7 +84,8 @@ class BatchAgent:
 
     An agent reads the observations and the keys of the infos under `lgmd/`. All other keys are ground truth,
     which only oracles read. Its demands in one environment depend neither on N nor on the others. Subclasses
-    implement `demands`, and `initial` if they have a state.
+    implement `demands`, and `initial` if they have a state. A state in attributes of their own must not
+    change in environments that are not active.
 
     Attributes:
         name: Name in agent strings, rows and tables.
@@ -148,7 +149,7 @@ class BatchAgent:
         self.alerts = self.alerts & ~selected
 
     def act(self, observations: Observations, infos: Infos, active: np.ndarray | None = None) -> np.ndarray:
-        """Return the demands for one observation of every active environment.
+        """Return the demands for one observation of every active environment; the others keep their state.
 
         Args:
             observations: Observations, arrays of shape (N, …). The rows of other environments are undefined.
@@ -163,7 +164,10 @@ class BatchAgent:
             active = np.ones(self.num_envs, np.bool_)
         if "lgmd/alert" in infos:
             self.alerts = np.array(infos["lgmd/alert"], np.bool_)
+        kept = {} if active.all() else {name: values[~active] for name, values in self.state.items()}
         demands = self.demands(observations, infos, active)
+        for name, values in kept.items():
+            self.state[name][~active] = values
         return np.asarray(demands, np.float32).astype(np.float64)
 
     def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:

@@ -100,7 +100,7 @@ def check_rows(name, steps, trace=True, draw=None):
             assert single.act(select(observations, index), given)[0] == acted[index], (step, index)
             assert single.alerts[0] == together.alerts[index], (step, index)
         demands.append(acted[active])
-        started, seeds = (rng.random(NUM_ENVS) < 0.03) | ~active, rng.integers(100, size=NUM_ENVS)
+        started, seeds = rng.random(NUM_ENVS) < 0.03, rng.integers(100, size=NUM_ENVS)
     return np.concatenate(demands)
 
 

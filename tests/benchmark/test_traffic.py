@@ -6,15 +6,16 @@ from dataclasses import replace
 import gymnasium as gym
 import numpy as np
 import pytest
-from support.traffic import Recorded
+from support.traffic import Recorded, step_of
 
-from lgmd_gym.agents import BRAKE, HOLD, make_agent, to_action
+from lgmd_gym.agents import BRAKE, HOLD, BatchAgent, make_agent, to_action
 from lgmd_gym.benchmark.episode import Step, rollout
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.traffic import replay
+from lgmd_gym.benchmark.traffic import player
 from lgmd_gym.benchmark.traffic.batch import TrafficDrive, TrafficTask, run_traffic_task
 from lgmd_gym.benchmark.traffic.branch import branch_from, fork
-from lgmd_gym.benchmark.traffic.replay import RESEED, LiveEpisode
+from lgmd_gym.benchmark.traffic.player import LiveEpisode
+from lgmd_gym.benchmark.traffic.replay import RESEED
 from lgmd_gym.benchmark.traffic.rows import KEYS, BrakingEvent, measure
 from lgmd_gym.envs.appearance import Appearance
 from lgmd_gym.envs.dynamics.brake import draw_brake
@@ -129,7 +130,7 @@ def test_recorded_steps_equal_those_of_the_wrapper(camera):
 def test_live_episode_continues_a_recording(merge, decision):
     live = LiveEpisode(merge.recording, decision, merge.sensor_config)
     for later in range(decision + 1, decision + 20):
-        assert same_inputs(live.step(HOLD), merge.steps[later])
+        assert same_inputs(step_of(live.step(HOLD)), merge.steps[later])
 
 
 def test_live_episode_observes_the_same_as_the_wrapper_while_braking(merge):
@@ -138,7 +139,7 @@ def test_live_episode_observes_the_same_as_the_wrapper_while_braking(merge):
     env.reset(seed=0)
     for _ in range(40):
         observation, _, terminated, truncated, info = env.step(to_action(BRAKE))
-        assert same_inputs(live.step(BRAKE), Step(observation, info, 0.0, terminated or truncated))
+        assert same_inputs(step_of(live.step(BRAKE)), Step(observation, info, 0.0, terminated or truncated))
 
 
 def test_live_episode_continues_in_the_world_of_the_recording():
@@ -147,7 +148,7 @@ def test_live_episode_continues_in_the_world_of_the_recording():
     recorded = Recorded("merge", 0, SENSORS, {"duration": 6}, appearance)
     live = LiveEpisode(recorded.recording, 30, SENSORS)
     assert live.env.brake == draw_brake(8003, wet=True)
-    steps = [live.step(HOLD) for _ in range(20)]
+    steps = [step_of(live.step(HOLD)) for _ in range(20)]
     assert all(map(same_inputs, steps, recorded.steps[31:]))
     env = gym.make(
         traffic_id("merge"), camera="fovea", trace=True, config={"duration": 6}, world=8003, weather="rain"
@@ -158,18 +159,74 @@ def test_live_episode_continues_in_the_world_of_the_recording():
         assert same_inputs(step, Step(observation, info, 0.0, terminated or truncated))
 
 
-def test_rows_of_a_batch_equal_those_of_single_drives():
-    agents = ("stopping-zone", "spike-threshold")
-    drives = (TrafficDrive("merge", 1, agents[:1]), TrafficDrive("intersection", 1, agents))
-    batch = run_traffic_task(TrafficTask(drives, SENSORS))
-    single = [
+def single_rows(drives):
+    """Return the rows of every agent alone in every drive."""
+    return [
         run_traffic_task(TrafficTask((replace(drive, agents=(agent,)),), SENSORS))[0]
         for drive in drives
         for agent in drive.agents
     ]
-    assert [row["error"] for row in batch] == [None] * 3
-    assert batch == single
-    assert batch[-1]["brakes"] > 0
+
+
+def test_rows_of_a_batch_equal_those_of_single_drives(wall_kinds):
+    agents = ("random-brake:rate=0.5", f"{__name__}:RareBrake", "spike-threshold", "stopping-zone")
+    drives = tuple(
+        TrafficDrive(kind, 1, names)
+        for kind, names in (("merge", agents[1:]), ("intersection", agents), ("wall", agents[:3]))
+    )
+    batch = run_traffic_task(TrafficTask(drives, SENSORS))
+    assert [row["error"] for row in batch] == [None] * 10
+    assert batch == single_rows(drives)
+    assert {row["agent"] for row in batch if row["brakes"] > 0} == {*agents}
+    assert sum(row["stops"] for row in batch) > 1  # the agents were reset in some drives
+
+
+class RareBrake:
+    """Brakes for 0.2 s of every 2 s, at times that differ from reset to reset."""
+
+    def reset(self, seed):
+        self.decision = seed % 60
+
+    def act(self, observation, info):
+        assert info["lgmd/trace"][-1].ego_speed == info["ego_speed"]
+        self.decision += 1
+        return -0.8 if self.decision % 60 < 6 else 0.0
+
+
+class FailsAbove(RareBrake):
+    """Fails at a speed above 24 m/s, which the ego has on the road with the wall only."""
+
+    error = RuntimeError
+
+    def act(self, observation, info):
+        if info["ego_speed"] > 24.0:
+            raise self.error("too fast")
+        return super().act(observation, info)
+
+
+class ExitsAbove(FailsAbove):
+    error = SystemExit
+
+
+class FailsTogether(BatchAgent):
+    """Fails in all episodes if one ego is faster than 24 m/s."""
+
+    def demands(self, observations, infos, active):
+        if infos["ego_speed"][active].max() > 24.0:
+            raise RuntimeError("too fast")
+        return np.zeros(self.num_envs)
+
+
+@pytest.mark.parametrize("others", [(), ("spike-threshold",)])
+@pytest.mark.parametrize("failing", ["FailsAbove", "ExitsAbove", "FailsTogether"])
+def test_an_agent_that_fails_in_one_drive_leaves_the_others(wall_kinds, failing, others):
+    agents = (f"{__name__}:{failing}", *others)
+    drives = (TrafficDrive("intersection", 1, agents), TrafficDrive("wall", 0, agents))
+    rows = run_traffic_task(TrafficTask(drives, SENSORS))
+    assert [row["error"] is None for row in rows] == [*[True] * len(agents), False, *[True] * len(others)]
+    failed = rows[len(agents)]
+    assert "too fast" in failed["error"]
+    assert rows[: len(agents)] == single_rows(drives[:1])
 
 
 def test_failure_in_one_drive_leaves_the_others(monkeypatch, wall_kinds):
@@ -280,7 +337,7 @@ def test_the_last_agent_of_a_drive_uses_the_sensors_of_the_recording(monkeypatch
     """It draws no frame twice; the row is that of an agent that shares the recording."""
     made = []
     monkeypatch.setattr(
-        replay, "LiveEpisode", lambda *arguments: made.append(LiveEpisode(*arguments)) or made[-1]
+        player, "LiveEpisode", lambda *arguments: made.append(LiveEpisode(*arguments)) or made[-1]
     )
     drive = TrafficDrive("intersection", 1, ("spike-threshold",))
     (alone,) = run_traffic_task(TrafficTask((drive,), SENSORS))

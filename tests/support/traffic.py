@@ -1,10 +1,16 @@
 """Traffic environments and helpers shared by test files."""
 
+import copy
+
 import numpy as np
 
+from lgmd_gym.agents.base import rows_of
+from lgmd_gym.agents.user_agents import UserAgents
+from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.sensors import SensorConfig
 from lgmd_gym.benchmark.traffic.batch import IN_LABORATORY
 from lgmd_gym.benchmark.traffic.observer import Observer
+from lgmd_gym.benchmark.traffic.player import AgentPlayer
 from lgmd_gym.benchmark.traffic.recording import record_traffic
 from lgmd_gym.benchmark.traffic.replay import Replay
 from lgmd_gym.envs.attention import Attention
@@ -123,15 +129,26 @@ class Recorded:
         self.sensor_config = sensor_config or SensorConfig()
         observer = Observer(self.sensor_config)
         self.recording = record_traffic(kind, seed, observer.sensors, 0, observer.fps, appearance, config)
-        self.steps = [observer.observe([moment])[0] for moment in self.recording.moments]
+        self.observed = [copy.deepcopy(observer.observe([moment])) for moment in self.recording.moments]
+        self.steps = [step_of(observed) for observed in self.observed]
 
     def replay(self, agent):
-        """Return the replay of an agent, played to its end."""
-        replay = Replay(self.recording, agent, self.sensor_config)
-        for step in self.steps:
-            if not replay.done:
-                replay.process(step)
+        """Return the replay of an agent for a single environment, played to its end."""
+        replay, player = Replay(self.recording), AgentPlayer(UserAgents("test", lambda: agent), 1)
+        for observed in self.observed:
+            for error in player.process(observed, [replay]).values():
+                raise error
+            if replay.needs_env:
+                player.play_alone(replay, 0, self.sensor_config)
+            if replay.done:
+                break
         return replay
+
+
+def step_of(observed):
+    """Return what an agent for a single environment receives."""
+    (moment,) = observed.moments
+    return Step(rows_of(observed.observations, 0), observed.infos.row(0), 0.0, moment.done)
 
 
 def car_states(kinds=tuple(TRAFFIC_KINDS)):

@@ -1,13 +1,15 @@
 """A batch of traffic episodes, which share the calls of their cameras and neurons."""
 
 import traceback
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from lgmd_gym.agents import make_agent
+from lgmd_gym.agents import BatchAgent, make_agent
 from lgmd_gym.benchmark.case import TRAFFIC, TRAFFIC_SUITES, Row, new_row, traffic_case
-from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.traffic.observer import Observer
+from lgmd_gym.benchmark.traffic.observer import Observed, Observer
+from lgmd_gym.benchmark.traffic.player import AgentPlayer
 from lgmd_gym.benchmark.traffic.reader import Moment, SceneReader
 from lgmd_gym.benchmark.traffic.recording import record_traffic
 from lgmd_gym.benchmark.traffic.replay import Replay
@@ -45,16 +47,40 @@ def run_traffic_task(task: TrafficTask) -> list[Row]:
     All agents with the same cameras share a recording.
     """
     names = dict.fromkeys(agent for drive in task.drives for agent in drive.agents)
-    sensor_configs = {name: task.sensor_config.for_agent(make_agent(name)) for name in names}
-    groups: list[tuple[SensorConfig, list[str]]] = []
-    for name, sensor_config in sensor_configs.items():
+    groups: list[tuple[SensorConfig, dict[str, BatchAgent]]] = []
+    for name in names:
+        agent = make_agent(name).agent
+        sensor_config = task.sensor_config.for_agent(agent)
         same = [agents for known, agents in groups if known == sensor_config]
-        same[0].append(name) if same else groups.append((sensor_config, [name]))
+        same[0].update({name: agent}) if same else groups.append((sensor_config, {name: agent}))
     rows: dict[tuple[TrafficDrive, str], Row] = {}
     for sensor_config, agents in groups:
-        for drive in _play(task, sensor_config, set(agents)):
-            rows |= {(drive.drive, agent): row for agent, row in drive.rows.items()}
+        rows |= _play(task.drives, _Group(agents, sensor_config, task.condition))
     return [rows[drive, agent] for drive in task.drives for agent in drive.agents]
+
+
+class _Group(NamedTuple):
+    """Agents with the same cameras."""
+
+    agents: dict[str, BatchAgent]  # by name
+    sensor_config: SensorConfig
+    condition: str  # name of the weather, for the rows
+
+
+def _play(drives: Sequence[TrafficDrive], group: _Group) -> dict[tuple[TrafficDrive, str], Row]:
+    """Return the rows of the agents of a group in all drives.
+
+    An exception that belongs to no single drive, of an agent or of the cameras, ends a batch without rows.
+    The drives are then played one by one, so that the error belongs to those that cause it.
+    """
+    chosen = [drive for drive in drives if group.agents.keys() & {*drive.agents}]
+    rows = _Batch(chosen, group).play()
+    for drive in chosen:
+        for name in drive.agents:
+            if name in group.agents and (drive, name) not in rows:
+                alone = group._replace(agents={name: group.agents[name]})
+                rows |= _Batch([drive], alone).play()
+    return rows
 
 
 class _PlayedDrive:
@@ -66,34 +92,25 @@ class _PlayedDrive:
         replays: Unfinished replays, by agent.
     """
 
-    def __init__(
-        self,
-        drive: TrafficDrive,
-        agents: list[str],
-        task: TrafficTask,
-        sensor_config: SensorConfig,
-        observer: Observer,
-        index: int,
-    ) -> None:
+    def __init__(self, drive: TrafficDrive, group: _Group, observer: Observer, index: int) -> None:
         self.drive = drive
         self.rows: dict[str, Row] = {}
         self.replays: dict[str, Replay] = {}
         self._moments: tuple[Moment, ...] = ()
-        self._observer, self._index = observer, index
+        self._group, self._observer, self._index = group, observer, index
         self._reader: SceneReader | None = None  # of the last agent, from its first braking on
-        self._agents, self._condition, self._label = agents, task.condition, sensor_config.label
+        agents = [name for name in drive.agents if name in group.agents]
         try:
             attention = TRAFFIC_SUITES[drive.suite]
             recording = record_traffic(
                 *(drive.kind, drive.seed, observer.sensors, index, observer.fps, drive.appearance),
                 attention=attention,
             )
-            playing = {name: make_agent(name) for name in agents}
         except Exception:
-            self.fail()
+            self._fail(agents)
             return
         self._moments = recording.moments
-        self.replays = {name: Replay(recording, agent, sensor_config) for name, agent in playing.items()}
+        self.replays = {name: Replay(recording) for name in agents}
 
     def moment(self, decision: int) -> Moment | None:
         """Return what the sensors draw next: a decision of the recording, or of the last agent's drive."""
@@ -108,57 +125,93 @@ class _PlayedDrive:
         try:
             return self._reader.step(replay.demand)
         except Exception:
-            self.fail()
+            self._fail(list(self.replays))
             return None
 
-    def process(self, step: Step) -> None:
-        """Give the step of the next decision to the agents."""
-        for agent, replay in list(self.replays.items()):
-            try:
-                replay.process(step, last=len(self.replays) == 1)
-                if replay.done:
-                    self._add(agent, **measure(replay.recording, replay.log), camera=self._label)
-            except Exception:
-                self._add(agent, error=traceback.format_exc())
+    def proceed(self, agent: str, player: AgentPlayer) -> None:
+        """Fork the recording at an agent's first braking, and add the row of a finished replay.
 
-    def fail(self) -> None:
-        """End all unfinished agents with the present exception."""
-        for agent in self._agents:
-            if agent not in self.rows:
-                self._add(agent, error=traceback.format_exc())
+        The last agent continues with the sensors of the recording. Others still need the recorded frames of
+        earlier agents, so that these draw the frames so far again and play to the end.
+        """
+        replay = self.replays[agent]
+        try:
+            if replay.needs_env and len(self.replays) == 1:
+                replay.env = replay.recording.fork(replay.decision)
+            elif replay.needs_env:
+                player.play_alone(replay, self._index, self._group.sensor_config)
+            if replay.done:
+                label = self._group.sensor_config.label
+                self.add(agent, **measure(replay.recording, replay.log), camera=label)
+        except (Exception, SystemExit):  # an agent that calls exit() would end the worker process
+            self._fail([agent])
 
-    def _add(self, agent: str, **values: object) -> None:
+    def add(self, agent: str, **values: object) -> None:
         """Add the row of an agent, which ends its replay."""
         self.replays.pop(agent, None)
         drive = self.drive
         case = traffic_case(drive.kind, drive.seed, drive.suite)
         world = check_world(drive.appearance.world)
-        self.rows[agent] = new_row(KEYS, agent, case, drive.seed, self._condition, world=world, **values)
+        condition = self._group.condition
+        self.rows[agent] = new_row(KEYS, agent, case, drive.seed, condition, world=world, **values)
+
+    def _fail(self, agents: list[str]) -> None:
+        """End the replays of agents with the present exception."""
+        for agent in agents:
+            self.add(agent, error=traceback.format_exc())
 
 
-def _play(task: TrafficTask, sensor_config: SensorConfig, agents: set[str]) -> list[_PlayedDrive]:
-    """Play the drives with some agents, which have the same cameras."""
-    chosen = [
-        (drive, [agent for agent in drive.agents if agent in agents])
-        for drive in task.drives
-        if agents.intersection(drive.agents)
-    ]
-    observer = Observer(sensor_config, len(chosen))
-    drives = [
-        _PlayedDrive(drive, names, task, sensor_config, observer, index)
-        for index, (drive, names) in enumerate(chosen)
-    ]
-    try:
-        decision = 0
-        while any(drive.replays for drive in drives):
-            moments = [drive.moment(decision) for drive in drives]
-            if not any(moments):
-                break
-            for drive, step in zip(drives, observer.observe(moments), strict=True):
-                if step is not None:
-                    drive.process(step)
-            decision += 1
-    except Exception:  # of the cameras
-        for drive in drives:
-            drive.fail()
-    return drives
+class _Batch:
+    """The drives of a group during their play, which share the calls of the cameras, neurons and agents.
+
+    Args:
+        drives: The drives.
+        group: The agents.
+    """
+
+    def __init__(self, drives: list[TrafficDrive], group: _Group) -> None:
+        self._observer = Observer(group.sensor_config, len(drives))
+        self._drives = [
+            _PlayedDrive(drive, group, self._observer, index) for index, drive in enumerate(drives)
+        ]
+        self._agents = group.agents
+
+    def play(self) -> dict[tuple[TrafficDrive, str], Row]:
+        """Play the drives and return the rows by drive and agent; rows may be missing, see `_play`."""
+        try:
+            players = {name: AgentPlayer(agent, len(self._drives)) for name, agent in self._agents.items()}
+            decision = 0
+            while any(moments := [drive.moment(decision) for drive in self._drives]):
+                observed = self._observer.observe(moments)
+                for name, player in players.items():
+                    self._process(name, player, observed)
+                decision += 1
+        except (Exception, SystemExit):
+            self._fail(*self._agents)
+        return {(played.drive, name): row for played in self._drives for name, row in played.rows.items()}
+
+    def _process(self, name: str, player: AgentPlayer, observed: Observed) -> None:
+        """Process one decision of an agent in all drives."""
+        replays = [
+            drive.replays.get(name) if moment is not None else None
+            for drive, moment in zip(self._drives, observed.moments, strict=True)
+        ]
+        try:
+            failures = player.process(observed, replays)
+        except (Exception, SystemExit):
+            self._fail(name)
+            return
+        for index, (drive, replay) in enumerate(zip(self._drives, replays, strict=True)):
+            if index in failures:
+                drive.add(name, error="".join(traceback.format_exception(failures[index])))
+            elif replay is not None:
+                drive.proceed(name, player)
+
+    def _fail(self, *agents: str) -> None:
+        """End the replays of agents with the present exception; without a row if there are several drives."""
+        for drive in self._drives:
+            for name in drive.replays.keys() & set(agents):
+                if len(self._drives) == 1:
+                    drive.add(name, error=traceback.format_exc())
+                else:
+                    del drive.replays[name]

@@ -5,9 +5,9 @@ from math import isfinite
 
 from lgmd_gym.aliases import Values
 from lgmd_gym.benchmark.case import ID_KEYS, EpisodeRow
-from lgmd_gym.benchmark.episode import Step
 from lgmd_gym.benchmark.metrics import NUISANCE
 from lgmd_gym.benchmark.traffic.branch import Branch
+from lgmd_gym.benchmark.traffic.reader import Moment
 from lgmd_gym.benchmark.traffic.recording import TrafficRecording
 from lgmd_gym.envs.dynamics.brake import EMERGENCY
 from lgmd_gym.envs.surrogate_safety import PREDICTION
@@ -132,7 +132,7 @@ class EpisodeLog:
     events: list[BrakingEvent] = field(default_factory=list[BrakingEvent])  # braking events in order
     alerts: int = 0
     stops: int = 0  # number of standstills caused by braking events that count
-    end: Step | None = None  # last step
+    end: Moment | None = None  # last decision
     duration: float = 0.0  # duration of the episode [s]
     peak: float = 0.0  # highest deceleration beyond the driver's [m/s²]
     caused: bool = False  # whether a braking event caused the contact at the end
