@@ -171,7 +171,8 @@ class TrafficEgo(TrafficCar):
         self._start, self._parts = (self.speed, self.current_acceleration), []
         distance = sum(self._advance(duration, demand) for duration, demand in self._delay_line.advance(dt))
         course = self.heading + slip
-        self.position = self.position + distance * np.array([cos(course), sin(course)])
+        x, y = self.position.tolist()
+        self.position = np.array([x + distance * cos(course), y + distance * sin(course)])
         turned = distance * sin(slip) / (self.LENGTH / 2)
         self.heading += turned
         self.yaw_rate = turned / dt

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numba import extending, types
 
-from lgmd_gym.envs.dynamics.bodies import outline_of
+from lgmd_gym.envs.dynamics.bodies import BOX, outline_of
 from lgmd_gym.envs.dynamics.contact import Rectangle, first_touch
 from lgmd_gym.envs.dynamics.episode import touch_between, uniform_touch
 from lgmd_gym.kernels import kernel
@@ -468,12 +468,25 @@ def contact_time(before: np.ndarray, after: np.ndarray, ego: int, other: int, sh
 
 
 @kernel(exact=True)
-def mark_collisions(cars: np.ndarray, number: int) -> None:
-    """Mark the cars other than the ego that touch each other as crashed."""
+def mark_collisions(cars: np.ndarray, number: int) -> bool:
+    """Mark the cars other than the ego that touch each other as crashed; return whether one is new."""
+    found = False
     for i in range(number):
         for j in range(i):
             one, other = cars[i], cars[j]
             if one.is_ego or other.is_ego or abs(other.x - one.x) + abs(other.y - one.y) > MAX_APART:
                 continue
             if first_touch(outline_of(one), outline_of(other), 0.0, 0.0) == 0.0:
+                found |= one.crashed + other.crashed < 2.0
                 one.crashed = other.crashed = 1.0
+    return found
+
+
+@kernel(exact=True)
+def fill_bodies(cars: np.ndarray, ego: int, bodies: np.ndarray) -> None:
+    """Write `CAR` records to `BODY` records on straight paths, the ego first."""
+    for i in range(len(cars)):
+        car, body = cars[i], bodies[0 if i == ego else i + (i < ego)]
+        body.x, body.y, body.heading, body.speed = car.x, car.y, car.heading, car.speed
+        body.steering, body.length, body.width = car.steering, car.length, car.width
+        body.kind, body.path_end = BOX, 1

@@ -67,12 +67,18 @@ class LaneTable:
         project(cars, self.records, polar, along, across)
         return along, across
 
-    def bends(self, along: np.ndarray) -> np.ndarray:
-        """Return the angle of each lane to its axis at places along it [rad], shape (cars, lanes)."""
+    def bends(self, cars: np.ndarray, along: np.ndarray, seconds: float = 0.0) -> np.ndarray:
+        """Return the angle of each lane to its axis where cars are after a time [rad], shape (cars, lanes).
+
+        Args:
+            cars: `CAR` records.
+            along: Their coordinates along the lanes [m].
+            seconds: The time, in which they keep their speed along every lane [s].
+        """
         if not self._sine:
             return self._no_values(len(along))
-        lanes = self.records
-        return np.arctan(self._slopes * np.cos(lanes["pulsation"] * along + lanes["phase"]))
+        lanes, places = self.records, along + (cars["speed"] * seconds)[:, None]
+        return np.arctan(self._slopes * np.cos(lanes["pulsation"] * places + lanes["phase"]))
 
     def _no_values(self, count: int) -> np.ndarray:
         if len(self._zeros) < count:

@@ -106,6 +106,17 @@ def test_cars_move_as_on_a_road_of_highway_env(kind):
     assert changes > 0 or kind in ("two-way", "intersection", "roundabout"), "no lane change"
 
 
+def test_bodies_begin_with_the_ego():
+    env = make_traffic("highway", camera=None)
+    env.reset(seed=3)
+    cars = env.road.vehicles
+    cars.insert(2, cars.pop(cars.index(env.ego)))
+    bodies, ordered = env.road.bodies(), [env.ego, *(car for car in cars if car is not env.ego)]
+    assert np.stack([bodies["x"], bodies["y"]], axis=1).tolist() == [car.position.tolist() for car in ordered]
+    for name, attribute in (("speed", "speed"), ("heading", "heading"), ("length", "LENGTH")):
+        assert bodies[name].tolist() == [getattr(car, attribute) for car in ordered]
+
+
 @pytest.mark.parametrize("kind", TRAFFIC_KINDS)
 def test_drivers_and_neighbour_searches_equal_highway_env(kind):
     """Neighbours, lanes, IDM accelerations and steering angles equal those of the original methods."""
@@ -116,7 +127,7 @@ def test_drivers_and_neighbour_searches_equal_highway_env(kind):
         run_for(env, 1)
         cars = road.read()
         along, across = lanes.coordinates(cars)
-        ahead = lanes.bends(along + (cars["speed"] * TAU_PURSUIT)[:, None])
+        ahead = lanes.bends(cars, along, TAU_PURSUIT)
         for i, car in enumerate(road.vehicles):
             assert car.lane_index == RoadNetwork.get_closest_lane_index(
                 road.network, car.position, car.heading

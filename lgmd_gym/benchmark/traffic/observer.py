@@ -8,7 +8,7 @@ import numpy as np
 from lgmd_gym.agents.base import TRACE, InfoArrays
 from lgmd_gym.aliases import Info
 from lgmd_gym.benchmark.sensors import SensorConfig
-from lgmd_gym.benchmark.traffic.reader import Moment, SceneFrame
+from lgmd_gym.benchmark.traffic.reader import Moment, SceneFrame, plain
 from lgmd_gym.envs.traffic.env import TrafficEnv
 from lgmd_gym.neuron import LGMDParams, Response
 from lgmd_gym.sensing.assembly import Assembly, EgoMotion, TraceFrame
@@ -72,6 +72,7 @@ class Observer:
         self.sensors = SensorArray(arguments["camera"], self.fps, params, num_envs)
         self._assembly = Assembly(self.sensors, frequency, arguments["include_frame"])
         self._top_views = self.sensors.top_views
+        self._scenes, self._objects = plain(self.sensors.scenes), plain(self.sensors.objects)
 
     def observe(self, moments: Sequence[Moment | None]) -> Observed:
         """Process the frames of one decision of every episode; None stands for one that is not played."""
@@ -103,8 +104,8 @@ class Observer:
 
     def _show(self, index: int, frame: SceneFrame) -> None:
         """Write the state of one frame into the sensors."""
-        sensors, count = self.sensors, len(frame.objects)
-        sensors.scenes[index] = frame.scene
-        sensors.objects[index, :count], sensors.object_counts[index] = frame.objects, count
+        count = len(frame.objects)
+        self._scenes[index : index + 1] = frame.scene
+        self._objects[index, :count], self.sensors.object_counts[index] = frame.objects, count
         for camera, picture in zip(self._top_views, frame.top_views, strict=True):
-            sensors.frame_of(camera, index)[:] = picture
+            self.sensors.frame_of(camera, index)[:] = picture

@@ -2,7 +2,7 @@
 # Not strict: highway-env states few types.
 """Reading of traffic environments: the state at every camera frame, for later drawing."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,8 @@ class SceneFrame(NamedTuple):
 
     time: float  # simulated time since the reset [s]
     speed: float  # ego speed [m/s]
-    scene: Any  # `SCENE` record
-    objects: np.ndarray  # `OBJECT` records
+    scene: np.ndarray  # `SCENE` record, see `plain`
+    objects: np.ndarray  # `OBJECT` records, see `plain`
     top_views: tuple[np.ndarray, ...] = ()  # frames of bird's-eye cameras, which only highway-env can draw
 
 
@@ -31,6 +31,11 @@ class Moment(NamedTuple):
     motion: EgoMotion  # motion of the ego in the decision
     frames: tuple[SceneFrame, ...]  # camera frames since the last decision
     done: bool  # whether the episode has ended
+
+
+def plain(records: np.ndarray) -> np.ndarray:
+    """Return a view of records that NumPy copies at once; it copies structured ones field by field."""
+    return records.view(np.dtype((np.void, records.itemsize)))
 
 
 class SceneReader:
@@ -51,6 +56,7 @@ class SceneReader:
         self._hz = env.config["simulation_frequency"]
         self._stride = round(self._hz / fps)
         self._top_views = sensors.top_views
+        self._scene, self._objects = plain(sensors.scenes)[index : index + 1], plain(sensors.objects)[index]
         self._substeps = decision * (self._hz // env.config["policy_frequency"])
         self._frames: list[SceneFrame] = []
         on_road_step(env, self._on_substep)
@@ -82,10 +88,10 @@ class SceneReader:
     def _read(self) -> None:
         sensors, i = self.sensors, self.index
         sensors.read(self.env, i)
-        objects = sensors.objects[i, : sensors.object_counts[i]].copy()
+        objects = self._objects[: sensors.object_counts[i]].copy()
         top_views = tuple(sensors.frame_of(k, i).copy() for k in self._top_views)
         time, speed = self._substeps / self._hz, float(self.env.ego.speed)
-        self._frames.append(SceneFrame(time, speed, sensors.scenes[i].copy(), objects, top_views))
+        self._frames.append(SceneFrame(time, speed, self._scene.copy(), objects, top_views))
 
 
 def _pose(env: TrafficEnv) -> EgoPose:
