@@ -112,6 +112,9 @@ def load_steps(spec: "NetworkSpec", path: Path, algo: str, num_actions: int | No
     if expected is None or weights is None or activation is None:
         return None
     check_shapes(expected, shapes_of(weights))
+    for name, values in weights.items():
+        if not np.isfinite(values).all():
+            raise ValueError(f"the weights {name} are not all finite")
     steps: list[Step] = []
     for name in (item.removesuffix("weight") for item in expected if item.endswith(".weight")):
         if name.startswith(_TO_ACTIONS):

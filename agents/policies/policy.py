@@ -489,9 +489,11 @@ def _remembered(load: Callable[[Path, PolicyCard], Any], path: Path, card: Polic
     """
     state = path.stat()
     key = (load, path.resolve(), state.st_mtime_ns, state.st_size, repr(card))
-    if key not in _LOADED:
+    try:  # not `in`, because another thread may clear it
+        return _LOADED[key]
+    except KeyError:
         found = load(path, card)
-        if len(_LOADED) >= _MAX_LOADED:
-            _LOADED.clear()
-        _LOADED[key] = found
-    return _LOADED[key]
+    if len(_LOADED) >= _MAX_LOADED:
+        _LOADED.clear()
+    _LOADED[key] = found
+    return found

@@ -24,7 +24,7 @@ MAX_PICKLE = 1_000_000  # bytes of the names and shapes; those of `all-round` ta
 _PICKLE, _ORDER = "/data.pkl", "/byteorder"  # ends of the names of members
 _DTYPES = {b"little": np.dtype("<f4"), b"big": np.dtype(">f4")}
 _OPERATIONS = b"".join((
-    pickle.PROTO, pickle.STOP, pickle.GLOBAL, pickle.REDUCE, pickle.BINPERSID, pickle.MARK,
+    pickle.PROTO, pickle.STOP, pickle.GLOBAL, pickle.BINPERSID, pickle.MARK,
     pickle.BINPUT, pickle.LONG_BINPUT, pickle.BINGET, pickle.LONG_BINGET,
     pickle.BINUNICODE, pickle.BININT, pickle.BININT1, pickle.BININT2, pickle.LONG1,
     pickle.NONE, pickle.NEWTRUE, pickle.NEWFALSE,
@@ -97,6 +97,13 @@ def _drop_state(unpickler: Any) -> None:
     unpickler.stack.pop()  # version numbers of layers; the operation of `pickle` sets any attribute
 
 
+def _call(unpickler: Any) -> None:
+    arguments = unpickler.stack.pop()
+    if type(arguments) is not tuple:  # the items of a tensor would be one Python object each
+        raise ValueError("its weights are damaged")
+    unpickler.stack[-1] = unpickler.stack[-1](*arguments)
+
+
 class _Unpickler(pickle._Unpickler):
     """Unpickler of tensors by name.
 
@@ -135,7 +142,10 @@ class _Unpickler(pickle._Unpickler):
     def persistent_load(self, pid: Any) -> np.ndarray:
         """Return the values of a storage, float32, shape (count,)."""
         kind, dtype, key, _, count = pid
-        if kind != "storage" or dtype != "float" or type(key) is not str:
+        # Exact types: a comparison with a tensor takes the memory of one, however large its shape is.
+        if not (type(kind) is type(dtype) is type(key) is str and type(count) is int):
+            raise ValueError("its weights must be in storages")
+        if kind != "storage" or dtype != "float":
             raise ValueError("its weights must be in storages")
         if key not in self._storages:  # read once, however often it is named
             self._storages[key] = np.frombuffer(self._archive.read(f"{self._folder}/data/{key}"), self._dtype)
@@ -146,6 +156,7 @@ class _Unpickler(pickle._Unpickler):
     dispatch = {code: pickle._Unpickler.dispatch[code] for code in _OPERATIONS} | {
         pickle.EMPTY_DICT[0]: _push_items,
         pickle.BUILD[0]: _drop_state,
+        pickle.REDUCE[0]: _call,
     }
 
 
@@ -159,6 +170,8 @@ def _view(storage: Any, offset: Any, size: Any, stride: Any, *_: object) -> np.n
     Raises:
         ValueError: Unless all of it is within the storage.
     """
+    if type(size) is not tuple or type(stride) is not tuple:
+        raise ValueError("the shapes of its weights are damaged")
     numbers = (offset, *size, *stride)
     if not all(type(number) is int and number >= 0 for number in numbers) or len(size) != len(stride):
         raise ValueError("the shapes of its weights are damaged")

@@ -114,7 +114,7 @@ def _extract(lanes: "list[AbstractLane]", *key: Any) -> RoadGeometry:
         records = np.zeros(0, OBJECT)
     else:
         records = _roadside_of(np.concatenate(segments).tobytes(), *key)
-    quads = _with_circles(_joined(np.concatenate(surface)))
+    quads = quad_records(_joined(np.concatenate(surface)))
     return RoadGeometry(quads, line_records(_without_duplicates(np.concatenate(lines))), records, False)
 
 
@@ -178,7 +178,7 @@ def _joined(surface: np.ndarray) -> np.ndarray:
     return np.array(joined)
 
 
-def _with_circles(quads: np.ndarray) -> np.ndarray:
+def quad_records(quads: np.ndarray) -> np.ndarray:
     """Return the `QUAD` records of quads, shape (n, 8): x, y of their corners in turn."""
     corners = quads.reshape(-1, 4, 2)
     centres = corners.mean(axis=1)

@@ -44,10 +44,13 @@ FLOAT, DATA = named("torch.FloatStorage"), VALUES.tobytes()
 
 
 def tensor(key="0", count=6, offset=0, size=(2, 3), stride=(3, 1), storage=FLOAT):
-    """Return the operations that make a tensor, as PyTorch writes them."""
-    place = b"(" + plain("storage") + storage + plain(key) + plain("cpu") + plain(count) + b"tQ"
+    """Return the operations that make a tensor, as PyTorch writes them; arguments of bytes are operations."""
+    key, count, size, stride = (
+        item if isinstance(item, bytes) else plain(item) for item in (key, count, size, stride)
+    )
+    place = b"(" + plain("storage") + storage + key + plain("cpu") + count + b"tQ"
     hooks = named("collections.OrderedDict") + b")R"
-    arguments = place + plain(offset) + plain(size) + plain(stride) + plain(False) + hooks
+    arguments = place + plain(offset) + size + stride + plain(False) + hooks
     return named("torch._utils._rebuild_tensor_v2") + b"(" + arguments + b"tR"
 
 
@@ -57,10 +60,10 @@ def state(item, name="weight"):
     return b"\x80\x02" + items + b"}" + plain("_metadata") + b"}sb."
 
 
-def write_model(path, pickled, folder="archive", order=b"little", values=DATA, extra=()):
+def write_model(path, pickled, folder="archive", order=b"little", values=DATA, extra=(), packed=False):
     """Write a model file with these weights."""
     data = io.BytesIO()
-    with zipfile.ZipFile(data, "w") as weights:
+    with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED if packed else zipfile.ZIP_STORED) as weights:
         members = {"data.pkl": pickled, "byteorder": order, "data/0": values, **dict(extra)}
         for name, content in members.items():
             if content is not None:
@@ -91,6 +94,7 @@ class Attack:
         return os._exit, (7,)
 
 
+ENDLESS = tensor(size=(2**60,), stride=(0,))  # a view of one number
 PAIRS = plain(()) + b"q\x01" + b"h\x01h\x01\x86q\x01" * 60  # of pairs of pairs
 
 
@@ -121,6 +125,12 @@ PAIRS = plain(()) + b"q\x01" + b"h\x01h\x01\x86q\x01" * 60  # of pairs of pairs
     (b"\x80\x02}(" + PAIRS + plain(0) + b"u.", "must have names"),
     (state(plain(3)), "not tensors by name"),
     (b"\x80\x02" + tensor() + b".", "not tensors by name"),
+    (b"\x80\x02" + named("collections.OrderedDict") + ENDLESS + b"R.", "are damaged"),
+    (state(tensor(size=ENDLESS)), "shapes of its weights are damaged"),
+    (state(tensor(stride=ENDLESS)), "shapes of its weights are damaged"),
+    (state(tensor(count=ENDLESS)), "must be in storages"),
+    (state(tensor(key=ENDLESS)), "must be in storages"),
+    (state(tensor(storage=ENDLESS)), "must be in storages"),
     (state(tensor())[:-1], "are damaged"),
     (state(tensor())[:-40], "its weights"),
     (b"", "are damaged"),
@@ -150,9 +160,14 @@ def test_other_archives_are_refused(tmp_path, options, words):
         read_weights(write_model(tmp_path / "model.zip", state(tensor()), **options))
 
 
-def test_weights_that_unpack_to_too_much_are_refused(tmp_path, monkeypatch):
+@pytest.mark.parametrize("inside", [True, False])
+def test_weights_that_unpack_to_too_much_are_refused(tmp_path, monkeypatch, inside):
     monkeypatch.setattr("lgmd_gym.agents.policies.weights.MAX_BYTES", 2000)
-    path = write_model(tmp_path / "model.zip", state(tensor()), extra={"data/1": bytes(2000)})
+    more = {"data/1": bytes(2000)} if inside else {}
+    path = write_model(tmp_path / "model.zip", state(tensor()), extra=more, packed=inside)
+    if not inside:
+        with zipfile.ZipFile(path, "a") as model:
+            model.writestr("data", bytes(2000))
     with pytest.raises(ValueError, match="bytes, more than 2000"):
         read_weights(path)
 

@@ -14,7 +14,7 @@ from lgmd_gym.camera.render.buffers import GroundLayer
 from lgmd_gym.camera.render.ground import PAINT, ROAD, add_lines, add_road
 from lgmd_gym.camera.render.seen import FRUSTUM
 from lgmd_gym.camera.render.texture import TEXEL_M, bend_of, bent_texels, distance_ahead, texture_line
-from lgmd_gym.camera.road_geometry import STRIPED, line_records, road_geometry
+from lgmd_gym.camera.road_geometry import STRIPED, line_records, quad_records, road_geometry
 from lgmd_gym.kernels import kernel
 from lgmd_gym.kernels.simd import as_floats, lane_numbers, splat, store
 
@@ -215,3 +215,32 @@ def test_what_is_outside_the_view_is_left_out(turn, pitch, roll):
     assert sums[0][ROAD].max() > 0.99
     assert sums[0][PAINT].max() > 0.5
     np.testing.assert_allclose(sums[1], sums[0], atol=3e-4)
+
+
+@compiled_only
+@pytest.mark.parametrize("pitch", [-1.2, -0.5, 0.0])
+def test_lines_and_quads_at_the_border_of_the_view_are_kept(pitch):
+    """One after the other, in all directions from the lens, most of them partly in the view."""
+    pose = {"z": 3.0, "pitch": pitch, "roll": 0.05, "yaw": 0.4}
+    everywhere, rng = record(FRUSTUM, tangent=-1.0, near=-np.inf, far=np.inf), np.random.default_rng(5)
+    shown = 0
+    for _ in range(300):
+        x, y, turn = *rng.uniform(-6.0, 12.0, 2), rng.uniform(-pi, pi)
+        ahead, aside = (
+            rng.uniform(0.1, 8.0) * np.array([cos(turn), sin(turn)]),
+            np.array([-sin(turn), cos(turn)]),
+        )
+        start = np.array([x, y])
+        line = line_records(np.array([[*start, *(start + ahead), 0.0, 0.0]])).view(np.recarray)
+        corners = start - aside, start + aside, start + ahead + aside, start + ahead - aside
+        quad = quad_records(np.concatenate(corners)[None]).view(np.recarray)
+        sums = []
+        for frustum in (everywhere, frustum_of(**pose)):
+            coverage = np.zeros((4, 80, 122), np.float32)
+            layer = GroundLayer(coverage, np.zeros((3, 16)), np.zeros((2, 20)), np.zeros((2, 8)), frustum)
+            add_road(layer, lens_of(**pose), quad)
+            add_lines(layer, lens_of(**pose), line, LOOK)
+            sums.append(np.cumsum(coverage, axis=2)[:, :, :120])
+        shown += sums[0][PAINT].max() > 0.01
+        np.testing.assert_allclose(sums[1], sums[0], atol=1e-3)
+    assert 20 < shown < 280

@@ -220,9 +220,8 @@ def _sides_of(a, b, px, py):
     gap_x, gap_y = abs(bx) - half_x - 0.5 * a.length, abs(by) - half_y - 0.5 * a.width
     ex, ey = px - a.x, py - a.y
     lx, ly = ex * a.cos + ey * a.sin, ey * a.cos - ex * a.sin
-    # Both planes are in the middle of their gaps.
-    beyond_x = (lx if bx > 0.0 else -lx) > 0.5 * a.length + 0.5 * gap_x
-    beyond_y = (ly if by > 0.0 else -ly) > 0.5 * a.width + 0.5 * gap_y
+    beyond_x = (lx if bx > 0.0 else -lx) > 0.5 * a.length
+    beyond_y = (ly if by > 0.0 else -ly) > 0.5 * a.width
     apart_x, apart_y = gap_x >= 0.0, gap_y >= 0.0
     on_a = (apart_x and not beyond_x) or (apart_y and not beyond_y)
     return on_a, (apart_x and beyond_x) or (apart_y and beyond_y)
@@ -242,12 +241,12 @@ def _hides(a, b, eye, away_a, away_b):
     also_b, also_a = _sides_of(box_b, box_a, eye.x, eye.y)
     on_a, on_b = on_a or also_a, on_b or also_b
     if a.base > 0.0 and a.base >= b.height:
-        above = eye.z > 0.5 * (a.base + b.height)
+        above = eye.z > a.base
         on_a, on_b = on_a or above, on_b or not above
     elif b.base > 0.0 and b.base >= a.height:
-        below = eye.z < 0.5 * (b.base + a.height)
+        below = eye.z < b.base
         on_a, on_b = on_a or below, on_b or not below
-    return away_a < away_b if not (on_a or on_b) else on_a and not on_b
+    return away_a < away_b if not (on_a or on_b) else not on_b
 
 
 @kernel
