@@ -159,6 +159,9 @@ class BatchAgent:
         Returns:
             Demands in [-1, 1], float64, shape (N,), rounded to the float32 of an action. The rows of other
             environments are undefined.
+
+        Raises:
+            ValueError: If `demands` returns another shape.
         """
         if active is None:
             active = np.ones(self.num_envs, np.bool_)
@@ -167,8 +170,13 @@ class BatchAgent:
         kept = {} if active.all() else {name: values[~active] for name, values in self.state.items()}
         demands = self.demands(observations, infos, active)
         for name, values in kept.items():
+            self.state[name] = np.array(self.state[name])  # an agent may have set a read-only one
             self.state[name][~active] = values
-        return np.asarray(demands, np.float32).astype(np.float64)
+        demands = np.asarray(demands, np.float32)
+        if demands.shape != (self.num_envs,):
+            shape = (self.num_envs,)
+            raise ValueError(f"demands of agent {self.name} must have shape {shape}, got {demands.shape}")
+        return demands.astype(np.float64)
 
     def demands(self, observations: Observations, infos: Infos, active: np.ndarray) -> np.ndarray:
         """Return the longitudinal demands in [-1, 1], shape (N,); arguments as of `act`."""

@@ -125,7 +125,8 @@ def make_user_agent(text: str) -> BatchAgent:
     name = f"{module}:{class_name}"
     names = vars(import_user_module(module, f"agent {shown(name)}"))
     if class_name not in names:
-        classes = [f"{module}:{item}" for item, value in names.items() if isinstance(value, type)]
+        public = {item: value for item, value in names.items() if not item.startswith("_")}
+        classes = [f"{module}:{item}" for item, value in public.items() if isinstance(value, type)]
         raise unknown_name("agent class", name, classes)
     agent_class = names[class_name]
     if not callable(getattr(agent_class, "act", None)):

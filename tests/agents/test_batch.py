@@ -6,7 +6,7 @@ from support.agents import NeuronResponse, TraceFrame
 from support.policies import write_policy
 
 from lgmd_gym.agents import AGENTS, make_agents
-from lgmd_gym.agents.base import InfoArrays
+from lgmd_gym.agents.base import BatchAgent, InfoArrays
 from lgmd_gym.agents.policies import policy as policies
 from lgmd_gym.agents.zones import LOW_ZONES, NUM_ZONES
 
@@ -164,3 +164,36 @@ def test_a_class_for_one_environment_has_one_object_for_each():
     assert agents.act(observations, infos)[[0, 2]].tolist() == [-0.25, -0.5]
     assert [str(error) for error in agents.failures.values()] == ["internal failure"]
     assert list(agents.failures) == [1]
+
+
+class Counting(BatchAgent):
+    """Replaces its state by what `convert` returns."""
+
+    convert = staticmethod(np.asarray)
+
+    def initial(self):
+        return {"count": 0}
+
+    def demands(self, observations, infos, active):
+        self.state["count"] = self.convert(self.state["count"] + 1)
+        return -0.1 * np.asarray(self.state["count"])
+
+
+@pytest.mark.parametrize("convert", [list, lambda values: np.broadcast_to(values[:1], 3)])
+def test_environments_that_are_not_active_keep_any_state(convert):
+    agent = Counting().for_envs(3)
+    agent.convert = convert
+    for active, counts in (([1, 1, 1], [1, 1, 1]), ([1, 0, 1], [2, 1, 2])):
+        agent.act({}, InfoArrays({}), np.array(active, np.bool_))
+        assert list(agent.state["count"]) == counts
+        agent.state["count"] = np.array(agent.state["count"])
+    agent.reset(np.array([True, False, False]))
+    assert agent.state["count"].tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("demands", [-1.0, np.zeros(1), np.zeros((3, 1)), np.zeros(4)])
+def test_demands_of_another_shape_are_refused(monkeypatch, demands):
+    agent = BatchAgent().for_envs(3)
+    monkeypatch.setattr(agent, "demands", lambda *_: demands, raising=False)
+    with pytest.raises(ValueError, match=r"demands of agent agent must have shape \(3,\), got \("):
+        agent.act({}, InfoArrays({}))

@@ -78,7 +78,8 @@ def _play(drives: Sequence[TrafficDrive], group: _Group) -> dict[tuple[TrafficDr
     for drive in chosen:
         for name in drive.agents:
             if name in group.agents and (drive, name) not in rows:
-                alone = group._replace(agents={name: group.agents[name]})
+                # Made anew: attributes of its own may hold what is left of the batch.
+                alone = group._replace(agents={name: make_agent(name).agent})
                 rows |= _Batch([drive], alone).play()
     return rows
 
