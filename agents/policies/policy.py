@@ -183,10 +183,8 @@ class Policy(StagedAgent):
         """
         network = load_network(self._file, self.card)
         if self._margin != 0.0 and self.card.brake is None:
-            layer = getattr(network, "action_net", None)
-            action = self._braking_action(layer is not None)
-            if layer is not None:
-                layer.bias.data[action] -= self._margin
+            action = self._braking_action(hasattr(network, "action_net"))
+            network.action_net.bias.data[action] -= self._margin
         return network
 
     def _check_network(self, space: Any, num_actions: int | None) -> None:

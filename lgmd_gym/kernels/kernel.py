@@ -35,11 +35,11 @@ from lgmd_gym.kernels.sources import source_stamp
 
 
 def _number_functions() -> None:
-    """Start the numbers that numba gives functions at a random one, in each process.
+    """Make numba's numbers of functions unique across processes.
 
-    They are a part of the names that the linker knows functions by, and start at 1 in numba. Modules that two
-    processes have cached would then use one name for two functions, such as the sum and the product of
-    vectors, and the linker would take one of them for both.
+    numba counts functions from 1 in every process, and the linker identifies a function by its name, types
+    and number. Two processes could cache different functions with the same identifier, such as the sum and
+    the product of vectors, and a caller of both would be linked with only one of them.
     """
     FunctionIdentity._unique_ids = itertools.count(secrets.randbits(60))
 

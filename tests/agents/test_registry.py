@@ -136,6 +136,12 @@ def test_an_invalid_string_is_rejected(text, message):
         make_agent(text)
 
 
+def test_private_classes_of_a_module_are_not_suggested(monkeypatch):
+    monkeypatch.setattr("math._Private", int, raising=False)
+    with pytest.raises(ValueError, match="unknown agent class 'math:Agent'; known: none"):
+        make_agent("math:Agent")
+
+
 class OnlyObservation:
     def act(self, observation):
         return 0.0

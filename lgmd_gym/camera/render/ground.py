@@ -19,7 +19,7 @@ import numpy as np
 
 from lgmd_gym.camera.render.coverage import NEAR, add_polygon, project_eight, sum_differences, winding
 from lgmd_gym.camera.render.light import row_air, through_air
-from lgmd_gym.camera.render.seen import beside, outside_band
+from lgmd_gym.camera.render.seen import outside_view
 from lgmd_gym.camera.render.texture import (
     bend_of,
     bent_texels,
@@ -103,19 +103,13 @@ def add_outline(layer, k, lens, n, weight):
 
 
 @kernel
-def _is_outside(frustum, ahead, across, radius):
-    """Return whether a circle on the ground is outside the view; arguments as of `seen.beside`."""
-    return outside_band(frustum, ahead, radius) or beside(frustum, ahead, across, radius)
-
-
-@kernel
 def add_road(layer, lens, surface):
     """Add the asphalt, `RoadGeometry.surface`, to the ground layer."""
     for i in range(surface.shape[0]):
         quad = surface[i]
         dx, dy = quad.x - lens.x, quad.y - lens.y
         ahead, across = dx * lens.cos_yaw + dy * lens.sin_yaw, dy * lens.cos_yaw - dx * lens.sin_yaw
-        if _is_outside(layer.frustum, ahead, across, quad.radius):
+        if outside_view(layer.frustum, ahead, across, quad.radius):
             continue
         for k in range(4):
             layer.outline[0, k] = quad.corners[2 * k] - lens.x
@@ -350,7 +344,7 @@ def add_lines(layer, lens, lines, look):
             width=look.line_width,
         )
         ahead, across = line.ahead + half * line.d_ahead, line.across + half * line.d_across
-        if _is_outside(layer.frustum, ahead, across, half + line.width):
+        if outside_view(layer.frustum, ahead, across, half + line.width):
             continue
         a, b = _visible_part(layer.frustum, line, piece.length)
         if not b > a:

@@ -110,6 +110,12 @@ def beside(frustum, ahead, across, radius):
 
 
 @kernel
+def outside_view(frustum, ahead, across, radius):
+    """Return whether a circle on the ground is outside the view; arguments as of `beside`."""
+    return outside_band(frustum, ahead, radius) or beside(frustum, ahead, across, radius)
+
+
+@kernel
 def _reach_of(obj):
     """Return the radius of an object on the ground, with its soft shadow [m]."""
     return 0.5 * math.sqrt(obj.length**2 + obj.width**2) + 0.4 + 0.1 * obj.height

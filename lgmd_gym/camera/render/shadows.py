@@ -25,7 +25,7 @@ from lgmd_gym.camera.objects import (
     light_of_code,
 )
 from lgmd_gym.camera.render.ground import CAST, PAINT, RECTANGLE, SHADOW, add_ground_polygon, add_outline
-from lgmd_gym.camera.render.seen import MAX_SEEN, beside, distance, first_from, outside_band
+from lgmd_gym.camera.render.seen import MAX_SEEN, distance, first_from, outside_band, outside_view
 from lgmd_gym.kernels import kernel
 from lgmd_gym.kernels.doubles import load_doubles, madd_doubles, splat_double
 
@@ -164,7 +164,7 @@ def add_cast_shadows(layer, view, seen, roadside):
         caster = seen.casters[i]
         ahead = caster.x * lens.cos_yaw + caster.y * lens.sin_yaw
         across = caster.y * lens.cos_yaw - caster.x * lens.sin_yaw
-        if outside_band(frustum, ahead, caster.radius) or beside(frustum, ahead, across, caster.radius):
+        if outside_view(frustum, ahead, across, caster.radius):
             continue
         if caster.index >= MAX_SEEN:
             add_shadow_of(layer, lens, roadside[caster.index - MAX_SEEN], away, caster.weight)
